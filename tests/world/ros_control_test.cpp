@@ -685,6 +685,40 @@ TEST(Guess, PoweredCastersAndArms) {
               ElementsAre("caster_wheel_front_left"));
 }
 
+// PR2: four powered casters with two wheels each. It stood still, since each steering joint was in
+// the guess twice.
+TEST(Guess, CastersOfTwoWheels) {
+  const std::string inertial =
+      "<inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
+      "iyz='0'/></inertial>";
+  std::string robot = "<robot name='bot'><link name='base'>" + inertial + "</link>";
+  for (const std::string caster : {"fl_caster", "fr_caster", "bl_caster", "br_caster"}) {
+    const std::string at = std::string(caster[0] == 'f' ? "0.2 " : "-0.2 ") +
+                           (caster[1] == 'l' ? "0.2" : "-0.2") + " 0.1";
+    robot += "<link name='" + caster + "'>" + inertial + "</link><joint name='" + caster +
+             "_rotation' type='continuous'><parent link='base'/><child link='" + caster +
+             "'/><origin xyz='" + at + "'/><axis xyz='0 0 1'/></joint>" +
+             transmission(caster + "_rotation");
+    for (const std::string wheel : {"_l_wheel", "_r_wheel"}) {
+      const std::string name = caster + wheel;
+      robot += "<link name='" + name + "'>" + inertial +
+               "<collision><geometry><sphere radius='0.08'/></geometry></collision></link>"
+               "<joint name='" +
+               name + "' type='continuous'><parent link='" + caster + "'/><child link='" + name +
+               "'/><origin xyz='0 " + (wheel[1] == 'l' ? "0.05" : "-0.05") +
+               " 0'/><axis xyz='0 1 0'/></joint>" + transmission(name);
+    }
+  }
+  const auto world = load_world_text(robot + "</robot>", "bot.urdf");
+  ASSERT_TRUE(world->models.back().model->drive);
+  EXPECT_EQ(drive_of(*world).steering, Steering::holonomic);
+  EXPECT_THAT(names(*world, drive_of(*world).steer_joints),
+              ElementsAre("fl_caster_rotation", "fr_caster_rotation", "bl_caster_rotation",
+                          "br_caster_rotation"));
+  EXPECT_EQ(drive_of(*world).left_joints.size(), 4u);
+  EXPECT_EQ(drive_of(*world).right_joints.size(), 4u);
+}
+
 TEST(Guess, MecanumByName) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("bot.urdf", four_wheels("", "mecanum_wheel_")));

@@ -227,7 +227,7 @@ class Guesser {
       return "omni";
     }
     if (steered == wheels_.size()) {  // every wheel can be steered
-      for (const Wheel& wheel : wheels_) name("ruedo:steer_joint", wheel.steer);
+      for (const ModelJointIndex joint : steering_joints()) name("ruedo:steer_joint", joint);
       name_sides();
       return "holonomic";
     }
@@ -254,15 +254,24 @@ class Guesser {
     }
   }
 
-  size_t name_steered() {
+  // Each once: a caster may have two wheels (PR2).
+  std::vector<ModelJointIndex> steering_joints() const {
     std::vector<ModelJointIndex> joints;
     for (const Wheel& wheel : wheels_) {
-      if (!wheel.steer.valid() ||
-          std::find(joints.begin(), joints.end(), wheel.steer) != joints.end())
-        continue;
-      joints.push_back(wheel.steer);
-      name("ruedo:steer_joint", wheel.steer, &steers_);
-      if (std::abs(aside(wheel)) < kAside_m) name("ruedo:left_joint", wheel.joint);
+      if (wheel.steer.valid() &&
+          std::find(joints.begin(), joints.end(), wheel.steer) == joints.end())
+        joints.push_back(wheel.steer);
+    }
+    return joints;
+  }
+
+  size_t name_steered() {
+    const std::vector<ModelJointIndex> joints = steering_joints();
+    for (const ModelJointIndex joint : joints) {
+      name("ruedo:steer_joint", joint, &steers_);
+      const auto wheel = std::find_if(wheels_.begin(), wheels_.end(),
+                                      [&](const Wheel& each) { return each.steer == joint; });
+      if (std::abs(aside(*wheel)) < kAside_m) name("ruedo:left_joint", wheel->joint);
     }
     return joints.size();
   }
