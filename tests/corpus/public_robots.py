@@ -12,6 +12,7 @@ import argparse
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -44,18 +45,28 @@ ROBOTS = read("public_robots.txt")
 REPOSITORIES = {full.partition("/")[2]: (full, commit) for full, commit in read("repositories.txt")}
 
 
-def clone(folder):
+def clone(folder, only):
+    """Gets the repositories that the folder lacks; returns those that could not be got."""
+    failed = []
     for name, (repository, commit) in REPOSITORIES.items():
         into = folder / name
-        if into.exists():
+        if into.exists() or (only and name not in only):
             continue
-        into.mkdir(parents=True)
-        for command in (
+        part = folder / f"{name}.part"  # what is interrupted is not taken for whole
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        commands = (
             ["init", "-q"],
             ["fetch", "-q", "--depth", "1", f"https://github.com/{repository}", commit],
             ["checkout", "-q", "FETCH_HEAD"],
-        ):
-            subprocess.run(["git", "-C", into, *command], check=True)
+        )
+        if any(subprocess.run(["git", "-C", part, *command]).returncode for command in commands):
+            shutil.rmtree(part)
+            failed.append(repository)
+            continue
+        part.rename(into)
+        print(f"{repository} is in {into}", file=sys.stderr, flush=True)
+    return failed
 
 
 def set_paths(folder, repository):
@@ -149,12 +160,12 @@ def main():
     parser.add_argument("what", choices=["clone", "drive"])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--ruedo", type=Path, help="the program")
-    parser.add_argument("--only", action="append", help="a robot's name")
+    parser.add_argument("--only", action="append", help="a robot's (drive), repository's name")
     arguments = parser.parse_args()
     folder = arguments.folder.resolve()
     if arguments.what == "clone":
-        clone(folder)
-        return
+        failed = clone(folder, arguments.only)
+        sys.exit(f"could not get {', '.join(failed)}" if failed else 0)
     os.environ["RUEDO"] = str(arguments.ruedo.resolve())
     OUT.mkdir(exist_ok=True)
     readme = OUT / "README.md"
