@@ -200,5 +200,44 @@ TEST(OnePose, IsThatOfBaseLinkForAllWhoTell) {
   EXPECT_GE(wheels, 6);
 }
 
+// REP-120: base_footprint is on the ground, and base_link where the file's fixed joint has it. The
+// robot's pose is that of base_footprint, if that is below the centre of rotation.
+TEST(OnePose, IsThatOfTheFootprintAndTheFilesJointAboveItIsKept) {
+  const std::string inertial =
+      "<inertial><mass value='1'/><inertia ixx='0.1' iyy='0.1' izz='0.1' ixy='0' ixz='0' "
+      "iyz='0'/></inertial>";
+  std::string robot =
+      "<robot name='bot'><link name='base_footprint'/><link name='base_link'>" + inertial +
+      "<collision><origin xyz='0.2 0 -0.06'/><geometry><sphere radius='0.04'/></geometry>"
+      "</collision></link><joint name='base_joint' type='fixed'><parent link='base_footprint'/>"
+      "<child link='base_link'/><origin xyz='0.03 0 0.1' rpy='0 0 0.25'/></joint>";
+  for (const std::string side : {"left", "right"}) {
+    const std::string y = side == "left" ? "0.2" : "-0.2", wheel = side + "_wheel";
+    robot += "<link name='" + wheel + "'>" + inertial +
+             "<collision><geometry><sphere radius='0.1'/></geometry></collision></link><joint "
+             "name='" +
+             wheel + "' type='continuous'><parent link='base_footprint'/><child link='" + wheel +
+             "'/><origin xyz='0 " + y + " 0.1'/><axis xyz='0 1 0'/></joint>";
+  }
+  robot +=
+      "<gazebo><plugin name='d' filename='libgazebo_ros_diff_drive.so'>"
+      "<left_joint>left_wheel</left_joint><right_joint>right_wheel</right_joint></plugin></gazebo>"
+      "</robot>";
+  const auto world = world::load_world_text(robot, "bot.urdf");
+  const world::BodyLayout layout(*world);
+  const world::LinkPlacement& link = layout.links[base_link(*world, layout)];
+  const Pose X_FootprintLink{Quat(Eigen::AngleAxisd(0.25, Vec3::UnitZ())), Vec3(0.03, 0, 0.1)};
+  engine::Engine engine(world, {});
+  int states = 0;
+  engine.on_state([&](int, const Snapshot& now, const engine::Batch&) {
+    ++states;
+    expect_equal(now.robots[RobotIndex(0)].X_WBase * X_FootprintLink,
+                 now.bodies[link.body] * link.X_BL, 1e-6, "at step " + std::to_string(now.step));
+  });
+  engine.drive(std::vector<double>{0.3, 0.0, 0.4});
+  engine.step(200);
+  EXPECT_GE(states, 200);
+}
+
 }  // namespace
 }  // namespace ruedo
