@@ -1,14 +1,18 @@
-// ruedo info: robots, devices, channels, rates and message types of a world, without running it.
+// ruedo info: robots, devices, channels, rates and message types of a world, without running it; or
+// what a log holds.
 #include <fmt/format.h>
 
 #include "base/json.h"
 #include "base/utf8.h"
 #include "base/version.h"
 #include "cli/support/commands.h"
+#include "cli/support/extensions.h"
 #include "cli/support/find_all.h"
 #include "cli/support/listing.h"
+#include "cli/support/log_listing.h"
 #include "engine/fleet.h"
 #include "engine/world_info.h"
+#include "log/summary.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::cli {
@@ -76,7 +80,16 @@ void print_json(const world::WorldModel& world, const std::vector<world_info_t>&
   fmt::print("{}\n", json.text());
 }
 
+int info_of_log(const InfoArguments& arguments) {
+  if (const auto options = result_options(arguments.world); !options.empty())
+    throw InputError({}, options[0] + ": is for a world; " + arguments.world.world + " is a log");
+  read_given_types();
+  print_log(arguments.world.world, arguments.json);
+  return kGood;
+}
+
 int info(const InfoArguments& arguments) {
+  if (log::is_log(arguments.world.world)) return info_of_log(arguments);
   const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   check_options(arguments.world, *world);
   const world::BodyLayout layout(*world);
@@ -112,11 +125,15 @@ int info(const InfoArguments& arguments) {
 }
 
 void add_info(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand(
-      "info", "print the robots, devices, channels, rates and message types of a world");
+  CLI::App* command = app.add_subcommand("info",
+                                         "print the robots, devices, channels, rates and message "
+                                         "types of a world, or what a log holds");
   const auto arguments = std::make_shared<InfoArguments>();
   add_world_arguments(*command, arguments->world);
+  command->get_option("WORLD")->description(
+      "SDF world or model, or URDF robot (xacro, too); or a log");
   command->add_flag("--json", arguments->json, "print JSON");
+  add_types_argument(*command);
   command->callback([arguments, &chosen] { chosen = [arguments] { return info(*arguments); }; });
 }
 
