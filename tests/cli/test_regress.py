@@ -86,6 +86,22 @@ def test_a_run_equals_its_golden_log(folder):
     assert done.returncode == 1 and "FAILED: the run differs from g.lcm" in done.stderr, done
 
 
+def test_a_failure_comes_before_the_findings_and_names_its_files(folder):
+    """What a reader of CI's output looks for; and the copy that was compared is gone."""
+    (folder / "w.sdf").write_text(WORLD.replace("<include>", "<nonsense/><include>", 1))
+    options = [each for each in RUN if each != "--no-page"]
+    done = program(
+        *("regress", "w.sdf", *options, "run.lcm", "--golden", "g.lcm", "--html", "d.html"),
+        *("--spawn", "p3at:other@3,0"),
+    )
+    assert done.returncode == 1 and done.stderr.startswith("FAILED: the run differs from"), done
+    assert done.stderr.index("plots of what differs: d.html") < done.stderr.index("nonsense")
+    assert (folder / "d.html").stat().st_size > 0
+    assert done.stdout.endswith("The run is in run.lcm, and as a page in run.lcm.html\n")
+    assert (folder / "run.lcm.html").stat().st_size > 0
+    assert not (folder / "run.lcm.kept").exists()
+
+
 @pytest.mark.parametrize(
     ("option", "file"),
     [("--golden", "run.lcm.kept"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],

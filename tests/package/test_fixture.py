@@ -60,3 +60,21 @@ def test_the_package_is_there_once(python, package):
     said = run(python, "-c", METADATA, more={"PYTHONPATH": package}, cwd="/")
     version = (SOURCE / "VERSION").read_text().strip()
     assert said == f"[('ruedo', '{version}')]\nruedo.regression\n"
+
+
+def test_the_summary_says_what_failed(python, package, tmp_path):
+    """Not the first warning of the run."""
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><nonsense/>"
+        "<include><uri>model://p3at</uri></include></world></sdf>"
+    )
+    (tmp_path / "test_it.py").write_text(
+        "def test_it_runs(ruedo_regression):\n"
+        "    ruedo_regression('w.sdf', duration=0.1, goal=(9, 9), radius=0.1, by=0.1)\n"
+    )
+    more = {"PYTHONPATH": package, "PYTHONDONTWRITEBYTECODE": "1", "COLUMNS": "200"}
+    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", tmp_path]
+    said = run(*command, more=more, cwd=tmp_path, code=1)
+    summary = said[said.index("short test summary") :]
+    assert "RegressionFailed: FAILED: 0.1" in summary and "was not within 0.1 m" in summary
+    assert "nonsense" in said

@@ -331,3 +331,18 @@ def test_another_project_goes_on_without_what_is_not_found(prefix, tmp_path):
         project="x CXX",
     )
     assert re.search(r"found (1|TRUE), gui (0|FALSE)?, client (1|TRUE)", said), said
+
+
+@pytest.mark.parametrize("program", ["./drive.sh", "sub/drive.sh", "../{}/drive.sh"])
+def test_a_relative_program_is_beside_the_file(prefix, tmp_path, program):
+    """As in pytest; ctest starts it in a folder of the test's own."""
+    program = program.format(tmp_path.name)
+    (tmp_path / "sub").mkdir()
+    file = tmp_path / program
+    file.write_text("#!/bin/sh\nexit 7\n")
+    file.chmod(0o755)
+    configure(prefix, tmp_path, f"ruedo_add_regression({GOOD} CLIENT {program} a b)")
+    line = value(commands(tmp_path)["gate"], "--client")
+    assert line == f"{file.resolve()} a b"
+    said = run("ctest", "--test-dir", tmp_path / "build", "--output-on-failure", code=8)
+    assert "the client ended with exit code 7" in said

@@ -51,6 +51,7 @@ _SINGLE = {
     *("odometry_error", "golden", "lockstep", "script"),
 }
 _VERDICT = "passed: "
+_REASON = "\nFAILED: "  # begins the line of what failed first
 _FAILED = 1  # the exit code of `ruedo regress` for a verdict; others are for what was not judged
 _PASSED = "\nThe run is in "  # what `ruedo regress` prints in the end
 _PathLike = str | os.PathLike[str]
@@ -183,6 +184,12 @@ def _patience(timeout: float) -> float:
     return min(seconds, _LONGEST_S)
 
 
+def _reason_first(output: str) -> str:
+    """pytest's summary shows the first line of an exception."""
+    at = f"\n{output}".find(_REASON)
+    return output if at < 0 else f"{output[at:].rstrip()}\n{output[:at]}".rstrip()
+
+
 def _output_of(
     command: list[str], folder: _PathLike | None, timeout: float, check: bool
 ) -> tuple[str, bool]:
@@ -210,7 +217,7 @@ def _output_of(
         return output, False
     if process.returncode != 0:
         raise RegressionFailed(
-            f"{output}\n(exit code {process.returncode} of {shlex.join(command)})"
+            f"{_reason_first(output)}\n(exit code {process.returncode} of {shlex.join(command)})"
         )
     if _PASSED not in f"\n{output}":  # as after an option that prints something in place of a run
         raise RegressionFailed(f"{output}\n(there was no run by {shlex.join(command)})")

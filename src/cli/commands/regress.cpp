@@ -86,17 +86,17 @@ std::string run_script(const RegressArguments& arguments) {
   return written() == before ? "" : "the script changed the log of the run: " + arguments.script;
 }
 
-// The failed run as a page beside its log, for machines without ruedo.
-void attach_page(const std::string& log) {
+// The failed run as a page beside its log, for machines without ruedo. Returns its name; "": none.
+std::string attach_page(const std::string& log) {
 #ifdef RUEDO_CONSOLE
   try {
     write_page(log, log + kPage, kPageSize_MB);
+    return log + kPage;
   } catch (const std::exception& error) {
     to_stderr("ruedo: no page of this run: {}\n", std::string(error.what()));
   }
-#else
-  static_cast<void>(log);
 #endif
+  return "";
 }
 
 // A run leaves two more files beside its log.
@@ -173,7 +173,6 @@ int regress(RegressArguments arguments) {
   const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   if (!arguments.record.empty()) check_output(arguments.record);
   if (keeps_log) check_files_beside(arguments);
-  print_findings(world->findings);
   judge::Judge judge(world, expectations(arguments));
   judge::Verdict verdict;
   const auto error = std::find_if(world->findings.begin(), world->findings.end(),
@@ -181,6 +180,7 @@ int regress(RegressArguments arguments) {
   if (!arguments.allow_errors && error != world->findings.end()) {
     verdict.checks.push_back(world_check(*error));
     tell(arguments, verdict);
+    print_findings(world->findings);
     return kCheckFailed;
   }
   run::RunOptions options = server_options(arguments);
@@ -199,9 +199,13 @@ int regress(RegressArguments arguments) {
   if (arguments.client.empty()) verdict.checks.front().text += " without a client";
   verdict.checks.insert(verdict.checks.begin() + 1, checks.begin(), checks.end());
   add_files(arguments, rules, renew, verdict);
-  if (!verdict.passed() && keeps_log && !arguments.no_page) attach_page(arguments.record);
+  std::string page;
+  if (!verdict.passed() && keeps_log && !arguments.no_page) page = attach_page(arguments.record);
   tell(arguments, verdict);
-  if (verdict.passed() && keeps_log) fmt::print("The run is in {}\n", arguments.record);
+  print_findings(world->findings);  // after the verdict, which a reader of CI's output looks for
+  if (keeps_log)
+    fmt::print("The run is in {}{}\n", arguments.record,
+               page.empty() ? "" : ", and as a page in " + page);
   return verdict.passed() ? kGood : kCheckFailed;
 }
 

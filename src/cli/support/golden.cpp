@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -64,6 +66,18 @@ void keep_channels(const std::string& from, const std::string& to,
   if (!writer.error().empty()) throw EnvironmentError(to + ": " + writer.error());
 }
 
+// A file that is removed in the end.
+class Removed {
+ public:
+  explicit Removed(std::string path) : path_(std::move(path)) {}
+  ~Removed() { std::remove(path_.c_str()); }
+  Removed(const Removed&) = delete;
+  Removed& operator=(const Removed&) = delete;
+
+ private:
+  std::string path_;
+};
+
 // What differs from the golden log, or "".
 std::string compare(const Golden& golden, const std::string& kept) {
   const log::Diff result = log::diff_logs(golden.log, kept, golden.rules);
@@ -72,7 +86,10 @@ std::string compare(const Golden& golden, const std::string& kept) {
   if (result.same()) return "";
   std::string text = "the run differs from " + golden.log;
   for (const std::string& fault : result.faults) text += " (" + fault + ")";
-  return text + ":\n" + log::diff_text(result);
+  text += ":\n" + log::diff_text(result);
+  if (golden.html.empty()) return text;
+  while (text.ends_with('\n')) text.pop_back();
+  return text + "\nplots of what differs: " + golden.html;
 }
 
 }  // namespace
@@ -82,6 +99,7 @@ std::string hold_to_golden(const Golden& golden, const std::string& record, bool
   if (std::error_code unreadable; !renew && !fs::exists(golden.log, unreadable))
     return "there is no golden log " + golden.log + " yet: run this once with RUEDO_RENEW=1";
   check_kept(golden, record, renew);
+  const Removed removed(kept);
   keep_channels(record, kept, golden.keep);
   if (!renew) return compare(golden, kept);
   if (const fs::path folder = fs::path(golden.log).parent_path(); !folder.empty()) {
