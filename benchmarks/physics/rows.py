@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import piles
 from scenes import (
     BOUNCING_PLANE,
     GRAVITY,
@@ -21,7 +22,9 @@ from scenes import (
     Scene,
     Shape,
     flat_mesh,
+    gripper,
     skid_steered,
+    turned_mesh,
 )
 from simulators import Simulator
 
@@ -199,6 +202,48 @@ def arm_error(make: Make, step_s: float, series: Series) -> float:
         return 1e3 * float(np.linalg.norm(sim.position("l5") - at))
 
 
+def slow_joint(make: Make, step_s: float, series: Series) -> float:
+    urdf = Chain().add("arm", (0, 0, 1), 1.0, (0.2, 0, 0), LINK, "0 0 1").urdf()
+    with make(Scene(urdf=urdf, commands=True), step_s) as sim:
+        sim.hold(["to_arm"], "velocity", 0.005)
+        sim.step(steps(60.0, step_s))
+        rotation = sim.rotation("arm")
+        return math.atan2(rotation[1, 0], rotation[0, 0])
+
+
+def damper(damping: float) -> Callable[[Make, float, Series], float]:
+    def measure(make: Make, step_s: float, series: Series) -> float:
+        chain = Chain().add(
+            "load", (0, 0, 1), 5.0, (0, 0, 0), LINK, "0 0 1", kind="prismatic", damping=damping
+        )
+        with make(Scene(urdf=chain.urdf()), step_s) as sim:
+            sim.step(steps(1.0, step_s))
+            start = sim.position("load")[2]
+            sim.step(steps(4.0, step_s))
+            return 1e3 * float(start - sim.position("load")[2]) / 4.0
+
+    return measure
+
+
+def gripping(what: str) -> Callable[[Make, float, Series], float]:
+    """A box of 0.5 kg between fingers that press it by 20 N, mu 0.6."""
+
+    def measure(make: Make, step_s: float, series: Series) -> float:
+        held = Body("box", (Shape("box", (0.04,) * 3, friction=0.6),), mass=0.5, at=(0, 0.003, 1))
+        with make(Scene((held,), urdf=gripper(), commands=True), step_s) as sim:
+            sim.push("to_left", 20.0)
+            sim.step(steps(1.0, step_s))
+            start, fastest = sim.position("box"), 0.0
+            for i in range(50):
+                sim.step(steps(0.1, step_s))
+                fastest = max(fastest, float(np.linalg.norm(sim.velocity("left")[0])))
+                slip = float(np.linalg.norm(sim.position("box") - start))
+                series.append((0.1 * (i + 1), 1e3 * slip))
+            return 1e3 * fastest if what == "speed" else series[-1][1]
+
+    return measure
+
+
 # Contacts
 
 
@@ -284,6 +329,43 @@ def spinning(make: Make, step_s: float, series: Series) -> float:
         return float(sim.velocity("ball")[1][2])
 
 
+DISK, SPIN = 0.1, 20.0  # m, rad/s
+
+
+@cache
+def way_of_disk(speed: float, mu: float) -> float:
+    """How far a disk slides whose load is spread evenly, and which spins: the integral of Coulomb
+    friction over its face, by quadrature, and Heun's method.
+    """
+    r, a = np.meshgrid((np.arange(40) + 0.5) / 40 * DISK, (np.arange(80) + 0.5) / 80 * 2 * math.pi)
+    x, y, area = r * np.cos(a), r * np.sin(a), r / r.sum()
+
+    def slowing(v: float, w: float) -> tuple[float, float]:
+        u, side = v - w * y, w * x
+        size = np.hypot(u, side) + 1e-12
+        force = float((area * u / size).sum())
+        moment = float((area * (x * side - y * u) / size).sum())
+        return -mu * GRAVITY * force, -mu * GRAVITY * moment / (DISK**2 / 2)
+
+    v, w, way, dt = speed, SPIN, 0.0, 2e-4
+    while v > 1e-3:
+        a1, b1 = slowing(v, w)
+        a2, b2 = slowing(v + a1 * dt, w + b1 * dt)
+        way += dt * (v + a1 * dt / 2)
+        v, w = v + (a1 + a2) / 2 * dt, w + (b1 + b2) / 2 * dt
+    return way
+
+
+def turning_disk(make: Make, step_s: float, series: Series) -> float:
+    disk = Body("disk", (Shape("cylinder", (DISK, 0.02), friction=0.4),), at=(0, 0, 0.01))
+    with make(Scene((PLANE, disk)), step_s) as sim:
+        sim.step(steps(0.2, step_s))
+        start = sim.position("disk")
+        sim.set_velocity("disk", (1, 0, 0), (0, 0, SPIN))
+        sim.step(steps(2.0, step_s))
+        return float(np.linalg.norm((sim.position("disk") - start)[:2]))
+
+
 # Small, thin, round and fast
 
 
@@ -337,7 +419,63 @@ def through_mesh(make: Make, step_s: float, series: Series) -> float:
         return float(sum(sim.position(ball.name)[2] < -0.001 for ball in balls))
 
 
+CUP = ((0, 0), (0.04, 0), (0.04, 0.1), (0.037, 0.1), (0.037, 0.003), (0, 0.003))
+PRISM = ((0, -0.15), (0.1, -0.15), (0.1, 0.15), (0, 0.15))
+
+
+@cache
+def solid(name: str, outline: tuple[tuple[float, float], ...], sides: int) -> Shape:
+    folder = Path(tempfile.mkdtemp(prefix="ruedo-solid-"))
+    return Shape("solid", file=turned_mesh(folder / f"{name}.obj", outline, sides), friction=0.5)
+
+
+def in_cup(make: Make, step_s: float, series: Series) -> float:
+    """The height of a ball that fell into a loose cup, over the cup's origin."""
+    cup = Body("cup", (solid("cup", CUP, 32),), mass=0.2, inertia=(5e-4,) * 3)
+    ball = Body("ball", (Shape("sphere", (0.025,)),), mass=0.05, at=(0.003, 0.002, 0.13))
+    with make(Scene((PLANE, cup, ball)), step_s) as sim:
+        sim.step(steps(2.0, step_s))
+        return float(sim.position("ball")[2] - sim.position("cup")[2])
+
+
+def lying_prism(make: Make, step_s: float, series: Series) -> float:
+    """How far a meshed cylinder of 64 sides moves that lies on one of them."""
+    flat = 0.1 * math.cos(math.pi / 64)
+    turn = math.pi / 64  # a side points down
+    body = Body(
+        "prism",
+        (solid("prism", PRISM, 64),),
+        at=(0, 0, flat),
+        rpy=(math.pi / 2, turn, 0),
+        inertia=(0.01, 0.01, 0.005),
+    )
+    with make(Scene((PLANE, body)), step_s) as sim:
+        sim.step(steps(0.5, step_s))
+        start = sim.position("prism")
+        sim.step(steps(20.0, step_s))
+        return 1e3 * float(np.linalg.norm(sim.position("prism") - start))
+
+
+def dominoes(make: Make, step_s: float, series: Series) -> float:
+    """How many of 20 dominoes of 48 x 24 x 7.6 mm fall after the first one."""
+    shape = Shape("box", (0.0076, 0.024, 0.048), friction=0.4)
+    row = [Body("d0", (shape,), mass=0.01, at=(0, 0, 0.0241), rpy=(0, 0.3, 0))]
+    row += [Body(f"d{i}", (shape,), mass=0.01, at=(0.02 * i, 0, 0.024)) for i in range(1, 20)]
+    with make(Scene((PLANE, *row)), step_s) as sim:
+        sim.step(steps(2.0, step_s))
+        return float(sum(sim.position(body.name)[2] < 0.02 for body in row))
+
+
 # Stacks
+
+
+def pyramid(make: Make, step_s: float, series: Series) -> float:
+    scene = piles.cylinders()
+    with make(scene, step_s) as sim:
+        sim.step(steps(10.0, step_s))
+        return 1e3 * max(
+            float(np.linalg.norm(sim.position(b.name) - np.array(b.at))) for b in scene.free
+        )
 
 
 def stack(boxes: int, top: float = 1.0) -> Callable[[Make, float, Series], float]:
@@ -424,6 +562,33 @@ def skidding(left: float, right: float) -> Callable[[Make, float, Series], float
     return measure
 
 
+def on_wheels(slope: float) -> Scene:
+    urdf = skid_steered(0.1345, 0.197, 0.111, 0.075, 14.0, 1.5, ahead=-0.05)
+    wheels = (("to_fl", "to_rl"), ("to_fr", "to_rr"))
+    return Scene((PLANE,), urdf=urdf, wheels=wheels, friction=0.8, slope=slope)
+
+
+def parked(make: Make, step_s: float, series: Series) -> float:
+    with make(on_wheels(math.radians(35)), step_s) as sim:
+        sim.drive(0, 0)
+        sim.step(steps(1.0, step_s))
+        start = sim.position("base")
+        sim.step(steps(5.0, step_s))
+        return 1e3 * float(np.linalg.norm(sim.position("base") - start))
+
+
+def braking(make: Make, step_s: float, series: Series) -> float:
+    """How far it slides on locked wheels, of what mu allows."""
+    with make(on_wheels(0.0), step_s) as sim:
+        sim.drive(10.0, 10.0)
+        sim.step(steps(2.0, step_s))
+        start, speed = sim.position("base"), float(np.linalg.norm(sim.velocity("base")[0]))
+        sim.drive(0, 0)
+        sim.step(steps(1.0, step_s))
+        way = float(np.linalg.norm(sim.position("base") - start))
+        return way / (speed**2 / (2 * 0.8 * GRAVITY))
+
+
 BALL = Body("ball", (Shape("sphere", (0.1,)),), at=(0, 0, 0.1))
 ROLLER = Body("roller", (Shape("cylinder", (0.1, 0.3)),), at=(0, 0, 0.1), rpy=(math.pi / 2, 0, 0))
 
@@ -437,8 +602,7 @@ FREE, JOINTED, CONTACT, SIZES, STACKS, MESHES = (
     "Stacks",
     "Floors of triangles",
 )
-SKIDDING = "Skid steering"
-WANG = "[Wang et al. 2015](https://doi.org/10.3390/s150509681)"
+SKIDDING, WHEELED = "Skid steering", "Standing and braking on wheels"
 CLOSED = "closed form"
 
 ROWS = [
@@ -513,6 +677,49 @@ ROWS = [
         3,
     ),
     Row(
+        "slow_joint",
+        JOINTED,
+        "joint told 0.005 rad/s: turned in 60 s",
+        "rad",
+        0.3,
+        CLOSED,
+        slow_joint,
+        4,
+    ),
+    *(
+        Row(
+            f"damper_{c:g}",
+            JOINTED,
+            f"5 kg on a slider with a damping of {c:g} N s/m: speed of its fall",
+            "mm/s",
+            1e3 * 5 * GRAVITY / c,
+            CLOSED,
+            damper(c),
+            4,
+        )
+        for c in (2e4, 1e5)
+    ),
+    Row(
+        "grip_slip",
+        JOINTED,
+        "0.5 kg between mimic fingers that press by 20 N, mu 0.6: slip in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        gripping("slip"),
+        3,
+    ),
+    Row(
+        "grip_speed",
+        JOINTED,
+        "the same: speed of a finger, at most",
+        "mm/s",
+        0.0,
+        CLOSED,
+        gripping("speed"),
+        3,
+    ),
+    Row(
         "sliding",
         CONTACT,
         "box pushed to 1 m/s, mu 0.4: way",
@@ -580,6 +787,15 @@ ROWS = [
         10 - 0.4 * 0.005 * GRAVITY / 0.004,
         CLOSED,
         spinning,
+    ),
+    Row(
+        "turning_disk",
+        CONTACT,
+        "disk of 10 cm, load spread evenly, at 1 m/s and 20 rad/s, mu 0.4: way",
+        "m",
+        way_of_disk(1.0, 0.4),
+        CLOSED,
+        turning_disk,
     ),
     Row(
         "cube_5mm",
@@ -661,6 +877,46 @@ ROWS = [
         through_mesh,
         3,
     ),
+    Row(
+        "prism",
+        SIZES,
+        "meshed cylinder of 64 sides, lying: moved in 20 s",
+        "mm",
+        0.0,
+        CLOSED,
+        lying_prism,
+        3,
+    ),
+    Row(
+        "in_cup",
+        SIZES,
+        "ball of 50 mm in a cup of triangles: height",
+        "m",
+        0.028,
+        CLOSED,
+        in_cup,
+    ),
+    Row(
+        "dominoes",
+        SIZES,
+        "dominoes of 48 x 24 x 7.6 mm, 20 mm apart: fallen, of 20",
+        "",
+        20.0,
+        CLOSED,
+        dominoes,
+        3,
+    ),
+    Row(
+        "pyramid",
+        STACKS,
+        "pyramid of 15 lying cylinders, mu 0.6: furthest from its place in 10 s",
+        "mm",
+        0.0,
+        CLOSED,
+        pyramid,
+        3,
+        long=True,
+    ),
     *(
         Row(
             f"stack_{n}",
@@ -722,8 +978,8 @@ ROWS = [
         SKIDDING,
         "P3-AT, wheels at -1 and 1 rad/s, mu 0.8: track that its wheels would say, of the real one",
         "",
-        1.466,
-        WANG,
+        1 + (0.1345 / 0.197) ** 2,
+        CLOSED,
         skidding(-1.0, 1.0),
         3,
     ),
@@ -732,9 +988,29 @@ ROWS = [
         SKIDDING,
         "the same on a curve, wheels at 1 and 3 rad/s",
         "",
-        1.41,
-        WANG,
+        1 + (0.1345 / 0.197) ** 2,
+        CLOSED,
         skidding(1.0, 3.0),
+        3,
+    ),
+    Row(
+        "parked",
+        WHEELED,
+        "robot told to stand on a slope of 35 degrees, mu 0.8: moved in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        parked,
+        3,
+    ),
+    Row(
+        "braking",
+        WHEELED,
+        "the same robot brakes from 1.1 m/s on a plane: way, of v^2 / (2 mu g)",
+        "",
+        1.0,
+        CLOSED,
+        braking,
         3,
     ),
     Row(

@@ -17,12 +17,13 @@ GRAVITY = 9.81
 @dataclass(frozen=True)
 class Shape:
     """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z),
-    capsule (the same, length without its ends), plane (), mesh ().
+    capsule (the same, length without its ends), plane (), mesh (), solid (closed,
+    it may move).
     """
 
     kind: str
     size: tuple[float, ...] = ()
-    file: Path | None = None  # of a mesh
+    file: Path | None = None  # of a mesh or a solid
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 1.0
     restitution: float = 0.0
@@ -59,12 +60,17 @@ class Scene:
     bodies: tuple[Body, ...] = ()
     urdf: str = ""  # a mechanism "robot" whose first link is called "world" and never moves
     gravity: float = GRAVITY
+    slope: float = 0.0  # the plane descends along x by that angle: gravity is turned
     commands: bool = False  # joints are commanded
     wheels: tuple[tuple[str, ...], tuple[str, ...]] = (
         (),
         (),
     )  # joints of a robot "robot" that moves: left and right, in `urdf`
     friction: float = 1.0  # of its wheels
+
+    def down(self) -> tuple[float, float, float]:
+        """The acceleration of gravity."""
+        return self.gravity * math.sin(self.slope), 0.0, -self.gravity * math.cos(self.slope)
 
     @property
     def free(self) -> list[Body]:
@@ -91,13 +97,17 @@ class Chain:
         inertia: tuple[float, float, float],
         axis: str = "0 1 0",
         rpy: tuple[float, float, float] = (0, 0, 0),
+        kind: str = "continuous",
+        damping: float = 0.0,
     ) -> Chain:
         i = inertia
+        range_m = 'lower="-10" upper="10" ' if kind == "prismatic" else ""
         self.links.append(
             f'<link name="{name}"><inertial><origin xyz="{_list(center)}"/><mass value="{mass!r}"/>'
             f'<inertia ixx="{i[0]!r}" iyy="{i[1]!r}" izz="{i[2]!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="to_{name}" type="continuous"><parent link="{self.last}"/><child link="{name}"/>'
-            f'<origin xyz="{_list(at)}" rpy="{_list(rpy)}"/><axis xyz="{axis}"/><limit effort="1000" velocity="1000"/></joint>'
+            f'<joint name="to_{name}" type="{kind}"><parent link="{self.last}"/><child link="{name}"/>'
+            f'<origin xyz="{_list(at)}" rpy="{_list(rpy)}"/><axis xyz="{axis}"/><dynamics damping="{damping!r}"/>'
+            f'<limit {range_m}effort="1000" velocity="1000"/></joint>'
         )
         self.last = name
         return self
@@ -113,9 +123,10 @@ def skid_steered(
     width: float,
     body_kg: float,
     wheel_kg: float,
+    ahead: float = 0.0,
 ) -> str:
     """A robot of four wheels as URDF; its first link, "base", has its origin on the ground, in the
-    middle.
+    middle, and its centre of mass `ahead` of it.
     """
     side, axle = wheel_kg * (3 * radius**2 + width**2) / 12, wheel_kg * radius**2 / 2
     wheels = ""
@@ -127,7 +138,7 @@ def skid_steered(
             f'<origin xyz="{x * half_base} {y * half_track} {radius}"/><axis xyz="0 1 0"/><limit effort="100" velocity="100"/></joint>'
         )
     return (
-        f'<robot name="robot"><link name="base"><inertial><origin xyz="0 0 0.18"/><mass value="{body_kg}"/>'
+        f'<robot name="robot"><link name="base"><inertial><origin xyz="{ahead!r} 0 0.18"/><mass value="{body_kg}"/>'
         f'<inertia ixx="0.1381" iyy="0.2829" izz="0.3277" ixy="0" ixz="0" iyz="0"/></inertial></link>{wheels}</robot>'
     )
 
@@ -148,6 +159,42 @@ def flat_mesh(
         for i in range(nx):
             a = j * (nx + 1) + i + 1
             lines += [f"f {a} {a + 1} {a + nx + 2}", f"f {a} {a + nx + 2} {a + nx + 1}"]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def gripper() -> str:
+    """Two fingers that slide along y, 50 mm apart, the second one by the mimic of the first one."""
+    fingers = ""
+    for name, y, mimic in (
+        ("left", -0.03, ""),
+        ("right", 0.03, '<mimic joint="to_left" multiplier="-1" offset="0"/>'),
+    ):
+        fingers += (
+            f'<link name="{name}"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
+            f'<collision><geometry><box size="0.03 0.01 0.06"/></geometry></collision></link>'
+            f'<joint name="to_{name}" type="prismatic"><parent link="world"/><child link="{name}"/>'
+            f'<origin xyz="0 {y} 1"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1000" velocity="1000"/>{mimic}</joint>'
+        )
+    return f'<robot name="robot"><link name="world"/>{fingers}</robot>'
+
+
+def turned_mesh(path: Path, outline: tuple[tuple[float, float], ...], sides: int) -> Path:
+    """A body of revolution about z with that many sides, from the points (r, z) of its outline,
+    counter-clockwise with z up and r to the right.
+    """
+    lines = [
+        f"v {r * math.cos(2 * math.pi * k / sides)!r} {r * math.sin(2 * math.pi * k / sides)!r} {z!r}"
+        for r, z in outline
+        for k in range(sides)
+    ]
+    for i in range(len(outline)):
+        j = (i + 1) % len(outline)
+        for k in range(sides):
+            a, b = (i * sides + m % sides + 1 for m in (k, k + 1))
+            d, c = (j * sides + m % sides + 1 for m in (k, k + 1))
+            lines += [f"f {a} {b} {d}"] if outline[i][0] else []
+            lines += [f"f {b} {c} {d}"] if outline[j][0] else []
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 

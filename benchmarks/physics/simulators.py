@@ -38,6 +38,10 @@ class Simulator:
     def hold(self, joints: Sequence[str], mode: str, value: float) -> None:
         """mode: "velocity" (rad/s) or "position" (rad)."""
 
+    def push(self, joint: str, effort: float) -> None:
+        """Gives the joint that effort (N or N m) in every step from now on."""
+        raise NotImplementedError
+
     def drive(self, left: float, right: float) -> None:
         """Turns the wheels of each side at these rates (rad/s)."""
 
@@ -105,10 +109,17 @@ class Ruedo(Simulator):
     def set_velocity(self, body, linear, angular=(0, 0, 0)) -> None:
         self._sim.set_twist(body, linear, angular)
 
+    def push(self, joint, effort) -> None:
+        self.hold([joint], "effort", effort)
+
     def hold(self, joints, mode, value) -> None:
         command = ruedo.lcmtypes.joint_command_t()
         command.n, command.name = len(joints), list(joints)
-        kind = command.POSITION if mode == "position" else command.VELOCITY
+        kind = {
+            "position": command.POSITION,
+            "velocity": command.VELOCITY,
+            "effort": command.EFFORT,
+        }[mode]
         command.mode, command.value = bytes([kind] * command.n), [value] * command.n
         self._commands.append(ruedo.Command("robot/joint_command", command.encode()))
 
@@ -133,7 +144,7 @@ class MuJoCo(Simulator):
         self._mj, self._scene = mujoco, scene
         spec = mujoco.MjSpec.from_string(scene.urdf) if scene.urdf else mujoco.MjSpec()
         option = spec.option
-        option.timestep, option.gravity = step_s, [0, 0, -scene.gravity]
+        option.timestep, option.gravity = step_s, list(scene.down())
         option.integrator, option.cone = (
             mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
             mujoco.mjtCone.mjCONE_ELLIPTIC,
@@ -142,8 +153,8 @@ class MuJoCo(Simulator):
             self._add(spec, body)
         self._targets: dict[str, tuple[str, float]] = {}
         if scene.commands:
-            for joint in list(spec.joints):
-                self._servos(spec, joint.name)
+            for joint in [j.name for j in spec.joints if j.type != mujoco.mjtJoint.mjJNT_FREE]:
+                self._servos(spec, joint)
         if scene.wheels[0]:
             self._on_wheels(spec)
         self._model = spec.compile()
@@ -188,6 +199,10 @@ class MuJoCo(Simulator):
             servo.gainprm[0] = gain
             servo.biasprm[:3] = bias
 
+    def push(self, joint, effort) -> None:
+        self._model.actuator_gainprm[:] = self._model.actuator_biasprm[:] = 0.0
+        self._data.joint(joint).qfrc_applied[0] = effort
+
     def _add(self, spec, body: Body) -> None:
         mj = self._mj
         holder = spec.worldbody.add_body(name=body.name, pos=body.at, quat=quaternion(body.rpy))
@@ -204,7 +219,10 @@ class MuJoCo(Simulator):
         }
         for shape in body.shapes:
             geom = holder.add_geom(pos=shape.at)
-            if shape.kind == "mesh":
+            if shape.kind == "solid":
+                spec.add_mesh(name=body.name, file=str(shape.file))
+                geom.type, geom.meshname = mj.mjtGeom.mjGEOM_MESH, body.name
+            elif shape.kind == "mesh":
                 spec.add_hfield(
                     name="floor",
                     nrow=251,
@@ -272,7 +290,7 @@ class PyBullet(Simulator):
         self._folder = tempfile.TemporaryDirectory(prefix="ruedo-physics-")
         self._id = pybullet.connect(pybullet.DIRECT)
         pybullet.setTimeStep(step_s, physicsClientId=self._id)
-        pybullet.setGravity(0, 0, -scene.gravity, physicsClientId=self._id)
+        pybullet.setGravity(*scene.down(), physicsClientId=self._id)
         self._bodies = {body.name: self._add(body) for body in scene.bodies}
         self._links: dict[str, int] = {}
         self._joints: dict[str, int] = {}
@@ -300,7 +318,7 @@ class PyBullet(Simulator):
                 i,
                 linearDamping=0,
                 angularDamping=0,
-                jointDamping=0,
+                jointDamping=info[6],
                 physicsClientId=self._id,
             )
         p.changeDynamics(
@@ -362,9 +380,8 @@ class PyBullet(Simulator):
             return p.createCollisionShape(kind, radius=shape.size[0], height=shape.size[1], **c)
         if shape.kind == "plane":
             return p.createCollisionShape(p.GEOM_PLANE, **c)
-        return p.createCollisionShape(
-            p.GEOM_MESH, fileName=str(shape.file), flags=p.GEOM_FORCE_CONCAVE_TRIMESH, **c
-        )
+        flags = {} if shape.kind == "solid" else {"flags": p.GEOM_FORCE_CONCAVE_TRIMESH}
+        return p.createCollisionShape(p.GEOM_MESH, fileName=str(shape.file), **flags, **c)
 
     def step(self, n: int = 1) -> None:
         for _ in range(n):
@@ -386,6 +403,10 @@ class PyBullet(Simulator):
                     0
                 ]
             )
+        if self._links[body] < 0:
+            return np.array(
+                self._p.getBasePositionAndOrientation(self._robot, physicsClientId=self._id)[0]
+            )
         return np.array(self._link(body)[4])
 
     def rotation(self, body: str) -> Vec:
@@ -404,6 +425,9 @@ class PyBullet(Simulator):
     def velocity(self, body: str) -> tuple[Vec, Vec]:
         if body in self._bodies:
             linear, angular = self._p.getBaseVelocity(self._bodies[body], physicsClientId=self._id)
+            return np.array(linear), np.array(angular)
+        if self._links[body] < 0:
+            linear, angular = self._p.getBaseVelocity(self._robot, physicsClientId=self._id)
             return np.array(linear), np.array(angular)
         state = self._link(body)
         linear, angular = np.array(state[6]), np.array(state[7])  # of the centre of mass
@@ -435,6 +459,9 @@ class PyBullet(Simulator):
                     force=1000,
                     physicsClientId=self._id,
                 )
+
+    def push(self, joint, effort) -> None:
+        raise NotImplementedError("mimic joints")
 
     def close(self) -> None:
         self._p.disconnect(self._id)
@@ -473,7 +500,7 @@ def sdf(scene: Scene, step_s: float) -> str:
             drive = f'<ruedo:drive type="wheels">{sides}<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive>'
         models += f"<include><uri>robot.urdf</uri><name>robot</name>{drive}</include>"
     return (
-        f'<sdf version="1.9" xmlns:ruedo="urn:ruedo"><world name="test"><gravity>0 0 {-scene.gravity!r}</gravity>'
+        f'<sdf version="1.9" xmlns:ruedo="urn:ruedo"><world name="test"><gravity>{" ".join(map(repr, scene.down()))}</gravity>'
         f'<physics name="step" type="bullet"><max_step_size>{step_s!r}</max_step_size></physics>{models}</world></sdf>'
     )
 
@@ -501,7 +528,7 @@ def _collision(name: str, shape: Shape) -> str:
             for kind in ("cylinder", "capsule")
         },
         "plane": lambda: "<plane><normal>0 0 1</normal></plane>",
-        "mesh": lambda: f"<mesh><uri>{shape.file}</uri></mesh>",
+        **{kind: lambda: f"<mesh><uri>{shape.file}</uri></mesh>" for kind in ("mesh", "solid")},
     }[shape.kind]()
     torsion = ""
     if shape.torsion_m:  # the moment is 3 pi / 16 of coefficient and radius

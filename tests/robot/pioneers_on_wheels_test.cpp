@@ -39,7 +39,7 @@ struct Pioneer {
 };
 
 // Four wheels at (0.1345, 0.197) m: 1 + a^2 / b^2. T. Wang et al., "Analysis and experimental
-// kinematics of a skid-steering wheeled robot", Sensors 15 (2015) 9681, measured 1.466 on a P3-AT
+// kinematics of a skid-steering wheeled robot", Sensors 15 (2015) 9681, give the same for a P3-AT
 // that turns on the spot.
 constexpr double kSkidOfP3at = 1.466;
 
