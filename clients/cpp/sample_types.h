@@ -2,39 +2,16 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "ruedo/client.h"
+#include "sample_list.h"
 #include "wire_reader.h"
 
 namespace ruedo::client {
-
-// All kinds of samples, each with its message type.
-#define RUEDO_SAMPLE_TYPES(X)        \
-  X(Scan, planar_lidar_t)            \
-  X(LidarScan, lidar_t)              \
-  X(SonarReading, sonar_t)           \
-  X(Odometry, odometry_t)            \
-  X(OdometryTwist, odometry_twist_t) \
-  X(Pose, pose_t)                    \
-  X(Image, image_t)                  \
-  X(CameraInfo, camera_info_t)       \
-  X(Imu, imu_t)                      \
-  X(Contact, contact_t)              \
-  X(Collisions, collisions_t)        \
-  X(Joints, joint_state_t)           \
-  X(MotionStatus, motion_status_t)   \
-  X(NavSat, navsat_t)                \
-  X(Magnetometer, magnetometer_t)    \
-  X(Altimeter, altimeter_t)          \
-  X(AirPressure, air_pressure_t)     \
-  X(AirSpeed, air_speed_t)           \
-  X(ForceTorque, force_torque_t)     \
-  X(LogicalCamera, logical_camera_t) \
-  X(Boxes2D, boxes_2d_t)             \
-  X(Boxes3D, boxes_3d_t)
 
 // A message type: its name and fingerprint, and how it becomes a sample.
 struct SampleDecoder {
@@ -42,6 +19,19 @@ struct SampleDecoder {
   int64_t fingerprint;
   std::shared_ptr<const Sample> (*decode)(WireReader&);  // throws WireError
 };
+
+// A later server may send values that are unknown here.
+template <class Enum>
+Enum known(int32_t number) {
+  const auto value = static_cast<Enum>(number);
+  return std::strcmp(to_string(value), "unknown") == 0 ? Enum::unknown : value;
+}
+
+// Throws WireError where an array does not have so many elements.
+inline void check_product(size_t size, int64_t rows, int64_t columns) {
+  if (rows < 0 || columns < 0 || static_cast<uint64_t>(rows * columns) != size)
+    throw WireError("sizes that do not fit each other");
+}
 
 // nullptr when this client does not know the type.
 const SampleDecoder* find_decoder(const std::string& type);

@@ -9,7 +9,6 @@
 #include "ruedo/join_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
-#include "ruedo/state_reply_t.hpp"
 #include "wire_reader.h"
 
 namespace ruedo::client {
@@ -18,14 +17,7 @@ namespace {
 constexpr auto kRepeatTime = std::chrono::milliseconds(100);
 constexpr int kMostLeaves = 5;  // that are sent: for half a second in all
 
-std::string kind_name(int32_t kind) {
-  static const char* const names[] = {
-      "",      "JOIN",  "LEAVE",  "PAUSE",    "RESUME",    "STEP",           "RATE",
-      "RESET", "SPAWN", "REMOVE", "SET_POSE", "SET_TWIST", "GET_STATE",      "INFO",
-      "QUIT",  "GRANT", "RESEND", "SNAPSHOT", "RESTORE",   "RESET_ODOMETRY", "SAVE"};
-  return kind > 0 && kind < static_cast<int32_t>(std::size(names)) ? names[kind]
-                                                                   : std::to_string(kind);
-}
+std::string kind_name(int32_t kind) { return to_string(static_cast<RequestKind>(kind)); }
 
 Reply checked(Reply reply) {
   if (reply.code == reply_t::OK) return reply;
@@ -191,27 +183,9 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   }
 }
 
-State state_of(const Reply& reply) {
-  try {
-    WireReader in(reply.body.data(), reply.body.size());
-    if (in.int64() != state_reply_t::getHash()) throw WireError("another version of the type");
-    State state;
-    state.utime = in.int64();
-    state.step = in.int64();
-    state.state_hash = in.int64();
-    state.paused = in.boolean();
-    state.rate = in.float64();
-    state.name = in.string();
-    state.position = in.array<3>();
-    state.orientation = in.array<4>();
-    state.linear = in.array<3>();
-    state.angular = in.array<3>();
-    return state;
-  } catch (const WireError& error) {
-    throw TypeMismatch(
-        std::string("the reply's body is no state_reply_t of this client's version: ") +
-        error.what());
-  }
+void wrong_body(const char* type, const std::exception& error) {
+  throw TypeMismatch(std::string("the reply's body is no ") + type +
+                     " of this client's version: " + error.what());
 }
 
 }  // namespace ruedo::client

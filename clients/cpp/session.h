@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ends.h"
+#include "replies.h"
 #include "ruedo/client.h"
 
 namespace ruedo {
@@ -31,8 +32,8 @@ struct Reply {
   std::vector<uint8_t> body;
 };
 
-// The body of a reply that has a state. Throws TypeMismatch.
-State state_of(const Reply& reply);
+// Throws TypeMismatch.
+[[noreturn]] void wrong_body(const char* type, const std::exception& error);
 
 class Session {
  public:

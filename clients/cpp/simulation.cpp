@@ -8,12 +8,9 @@
 
 #include "address.h"
 #include "core.h"
-#include "ruedo/name_request_t.hpp"
-#include "ruedo/rate_request_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/set_pose_request_t.hpp"
-#include "ruedo/set_twist_request_t.hpp"
 #include "ruedo/spawn_request_t.hpp"
 #include "ruedo/step_request_t.hpp"
 #include "server_process.h"
@@ -21,16 +18,10 @@
 namespace ruedo::client {
 namespace {
 
-constexpr Duration kReplyTime = 5.0, kSlowReplyTime = 60.0, kRestoreTime = 3600.0;
+constexpr Duration kReplyTime = 5.0, kSlowReplyTime = 60.0;
 
 Quaternion about_z(double heading) {
   return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)};
-}
-
-std::vector<uint8_t> name_body(const std::string& name) {
-  name_request_t body;
-  body.name = name;
-  return encoded(body);
 }
 
 }  // namespace
@@ -78,9 +69,9 @@ Simulation& Simulation::operator=(Simulation&& other) noexcept {
   return *this;
 }
 
-Simulation::Simulation(std::shared_ptr<Core> core) : core_(std::move(core)) {}
+Simulation::Simulation(std::shared_ptr<Core> core) : Requests(std::move(core)) {}
 
-std::shared_ptr<Core> Simulation::core() const {
+std::shared_ptr<Core> Requests::core() const {
   if (!core_) throw NoServer(kClosed);
   return core_;
 }
@@ -130,9 +121,6 @@ Subscription Simulation::on_new_run(std::function<void()> callback) const {
   return core()->on_new_run(std::move(callback));
 }
 
-void Simulation::pause() const { core()->session().request(request_t::PAUSE, {}, kReplyTime); }
-void Simulation::resume() const { core()->session().request(request_t::RESUME, {}, kReplyTime); }
-
 Observations Simulation::step(int64_t n, const std::vector<Command>& commands,
                               Duration timeout) const {
   if (lockstep()) return core()->stepper().step(n, commands, timeout);
@@ -147,12 +135,6 @@ Observations Simulation::step(int64_t n, const std::vector<Command>& commands,
 }
 
 bool Simulation::lockstep() const { return core()->in_lockstep(); }
-
-void Simulation::set_rate(double rate) const {
-  rate_request_t body;
-  body.rate = rate;
-  core()->session().request(request_t::RATE, encoded(body), kReplyTime);
-}
 
 void Simulation::reset(Reset what, int64_t seed) const {
   reset_request_t body;
@@ -186,7 +168,7 @@ std::string Simulation::spawn(const std::string& model, double x, double y,
 
 void Simulation::remove(const std::string& name) const {
   const auto before = core()->info();
-  core()->session().request(request_t::REMOVE, name_body(name), kReplyTime);
+  Requests::remove(name);
   core()->refresh_info(before);
 }
 
@@ -204,30 +186,8 @@ void Simulation::set_pose(const std::string& name, double x, double y, double he
   set_pose(name, {x, y, z}, about_z(heading));
 }
 
-void Simulation::set_twist(const std::string& name, const Vector3& linear,
-                           const Vector3& angular) const {
-  set_twist_request_t body;
-  body.name = name;
-  std::copy(linear.begin(), linear.end(), body.linear);
-  std::copy(angular.begin(), angular.end(), body.angular);
-  core()->session().request(request_t::SET_TWIST, encoded(body), kReplyTime);
-}
-
-State Simulation::state(const std::string& name) const {
-  return state_of(core()->session().request(request_t::GET_STATE, name_body(name), kReplyTime));
-}
-
-void Simulation::reset_odometry(const std::string& robot) const {
-  core()->session().request(request_t::RESET_ODOMETRY, name_body(robot), kReplyTime);
-}
-
-State Simulation::snapshot(const std::string& name) const {
-  return state_of(core()->session().request(request_t::SNAPSHOT, name_body(name), kSlowReplyTime));
-}
-
 State Simulation::restore(const std::string& name) const {
-  const State state =
-      state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
+  const State state = Requests::restore(name);
   core()->clock().reset(state.utime);
   core()->stepper().forget();
   return state;
@@ -235,7 +195,7 @@ State Simulation::restore(const std::string& name) const {
 
 void Simulation::quit() const {
   try {
-    core()->session().request(request_t::QUIT, {}, kReplyTime);
+    Requests::quit();
   } catch (const RunEnded&) {  // its last word may come before the reply, or without
   }
 }

@@ -1,4 +1,4 @@
-# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LICENSE, LCM_GEN, JAVAC and JAR say from what and with what.
+# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LICENSE, LCM_GEN, PYTHON, JAVAC and JAR say from what and with what.
 #
 # The message types come out as the package ruedo.lcmtypes: renamed on the way, so that they do not meet the
 # library's own classes; LCM's fingerprints do not depend on it. They need no class of LCM's, which may lie beside them.
@@ -26,7 +26,8 @@ foreach(type ${generated})
   string(REPLACE "new LCMDataInputStream(data)" "new DataInputStream(new ByteArrayInputStream(data))" text "${text}")
   file(WRITE ${type} "${text}")
 endforeach()
-file(GLOB library ${SOURCES}/src/ruedo/*.java)
+run(${PYTHON} -B ${PROTO}/generator java ${work}/java)
+file(GLOB library ${SOURCES}/src/ruedo/*.java ${work}/java/ruedo/*.java)
 file(GLOB message ${SOURCES}/src/ruedo/lcmtypes/*.java)
 run(${JAVAC} --release 11 -nowarn -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${generated} ${message})
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${library})

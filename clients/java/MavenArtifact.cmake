@@ -17,7 +17,7 @@ file(COPY ${SOURCES}/src/ruedo ${work}/java/ruedo DESTINATION ${work}/sources FI
 file(COPY ${LICENSE} DESTINATION ${work}/sources/META-INF)
 make_jar(${name}-sources.jar ${work}/sources --no-manifest)
 
-file(GLOB library ${SOURCES}/src/ruedo/*.java)
+file(GLOB library ${work}/sources/ruedo/*.java)
 run(${JAVADOC} -quiet -notimestamp -Xdoclint:all,-missing -Werror --release 11 -encoding UTF-8 -locale en
   -windowtitle "Ruedo ${VERSION}" -cp ${work}/classes -d ${work}/javadoc ${library})
 file(COPY ${LICENSE} DESTINATION ${work}/javadoc/META-INF)

@@ -1,5 +1,5 @@
 """Generates the message types as the Python package ruedo.lcmtypes, with lcm-gen, from the .lcm
-files, and ruedo._version.
+files; samples and enumerations from the vocabulary beside them; and ruedo._version.
 
     generate_types.py PROTO_FOLDER OUTPUT_FOLDER [--lcm-gen PROGRAM]
 
@@ -57,6 +57,7 @@ def generate(proto: Path, output: Path, lcm_gen: str | None = None) -> None:
         target = output / "ruedo" / "lcmtypes"
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(made / "ruedo" / "lcmtypes", target)
+    subprocess.run([sys.executable, str(proto / "generator"), "python", str(output)], check=True)
     (output / "ruedo" / "_version.py").write_text(f'__version__ = "{read_version(proto)}"\n')
 
 

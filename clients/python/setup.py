@@ -1,5 +1,5 @@
-"""Adds the message types, generated from ../../proto, and the version to what is built. The rest is
-in pyproject.toml.
+"""Adds what is generated from ../../proto (message types, samples) and the version to what is
+built. The rest is in pyproject.toml.
 """
 
 import runpy

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "ruedo/client_markers.h"
+#include "ruedo/client_requests.h"
 #include "ruedo/client_samples.h"
 
 /// The client of a running simulation.
@@ -75,20 +76,6 @@ struct DeviceInfo {
   int height = 0;               ///< layers, or pixels
   std::vector<std::array<double, 6>>
       elements;  ///< a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
-};
-
-/// The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
-/// "").
-struct State : Sample {
-  int64_t step = 0;        ///< its number
-  int64_t state_hash = 0;  ///< of the whole state, bit for bit
-  bool paused = false;     ///< no step is taken
-  double rate = 0.0;       ///< sim time per real time that is asked for; kFast: as fast as it goes
-  std::string name;        ///< what was asked for
-  Vector3 position{};      ///< m, world
-  Quaternion orientation{};  ///< to world
-  Vector3 linear{};          ///< m/s, world
-  Vector3 angular{};         ///< rad/s, world
 };
 
 /// A command for Simulation::step(), as Robot::velocity_command() and its like make it.
@@ -535,7 +522,7 @@ enum class Reset {
 
 /// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step()
 /// drives time.
-class [[nodiscard]] Simulation {
+class [[nodiscard]] Simulation : public Requests {
  public:
   /// @cond
   explicit Simulation(std::shared_ptr<Core> core);
@@ -575,12 +562,9 @@ class [[nodiscard]] Simulation {
   Subscription on_new_run(std::function<void()> callback) const;
 
   /// @name Requests
-  /// Each throws NotSupported where the server has no such request, RequestError when it refuses,
-  /// Timeout and NoServer.
+  /// Those of Requests, and these, which throw what those do.
   /// @{
 
-  void pause() const;   ///< No step is taken until resume().
-  void resume() const;  ///< Steps are taken again.
   /// Takes n steps and returns what was seen.
   ///
   /// In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with
@@ -594,8 +578,6 @@ class [[nodiscard]] Simulation {
   /// @throws LeaseLost when the others went on without this client; Timeout
   Observations step(int64_t n = 1, const std::vector<Command>& commands = {},
                     Duration timeout = 60.0) const;
-  /// @param rate sim time per real time; kFast: as fast as it goes
-  void set_rate(double rate) const;
   /// @param what is reset
   /// @param seed of the new epoch; -1: the same again
   void reset(Reset what = Reset::all, int64_t seed = -1) const;
@@ -606,7 +588,7 @@ class [[nodiscard]] Simulation {
   /// @return the model's name: the server numbers one that is taken, unless it was asked for
   std::string spawn(const std::string& model, double x, double y,
                     const SpawnOptions& options = {}) const;
-  /// @param name of a model
+  /// @copydoc Requests::remove
   void remove(const std::string& name) const;
   /// @param name of a model
   /// @param position m, world
@@ -620,28 +602,10 @@ class [[nodiscard]] Simulation {
   /// @param z m, world
   void set_pose(const std::string& name, double x, double y, double heading = 0.0,
                 double z = 0.0) const;
-  /// @param name of a model
-  /// @param linear m/s, world
-  /// @param angular rad/s, world
-  void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
-  /// @param name of a model, or MODEL/LINK; "": of none
-  /// @return the state of the simulation, and where that is
-  [[nodiscard]] State state(const std::string& name = "") const;
-  /// Its odometry begins at 0 again.
-  /// @param robot its name
-  void reset_odometry(const std::string& robot) const;
-  /// Saves the state in the folder that the server was started with (--snapshots FOLDER).
-  /// @param name of the snapshot
-  /// @return the state
-  State snapshot(const std::string& name) const;
-  /// Puts the world back to a snapshot; what follows equals what followed it. A new epoch. A
-  /// snapshot that the same user's server saved takes milliseconds. In the cases that
-  /// docs/determinism.md names the server repeats the snapshot's run from its beginning, without
-  /// publishing, at rate max.
-  /// @param name of the snapshot
-  /// @return the state
+  /// @copydoc Requests::restore
   State restore(const std::string& name) const;
-  void quit() const;  ///< Ends the server.
+  /// @copydoc Requests::quit
+  void quit() const;
   /// @}
 
   /// Draws for people to see, in the web console and in the log.
@@ -658,10 +622,6 @@ class [[nodiscard]] Simulation {
   /// @throws what a callback threw and no call has thrown since; while another exception is on its
   /// way it prints that
   void close();
-
- private:
-  std::shared_ptr<Core> core() const;  ///< throws NoServer once it was moved from
-  std::shared_ptr<Core> core_;
 };
 
 /// How connect() joins.

@@ -14,6 +14,7 @@ import pytest
 from conftest import HALL, PATIENCE, SOURCE, free_url, ruedo_run, tcp_server
 from lockstep_test import bad_network
 from ruedo import _engine, lcmtypes, samples
+from ruedo.fast_decoding import DECODERS
 
 ROBOTS, DECISIONS = 256, 3
 
@@ -169,13 +170,13 @@ def random_message(kind, random_):
     return message
 
 
-@pytest.mark.parametrize("kind", sorted(samples.DECODERS))
+@pytest.mark.parametrize("kind", sorted(DECODERS))
 def test_samples_from_the_bytes_are_those_of_the_generated_types(kind):
     random_ = random.Random(3)
     message_type, convert = samples.CONVERSIONS[kind]
     for _ in range(20):
         data = random_message(kind, random_).encode()
-        made, same = samples.DECODERS[kind](data), convert(message_type.decode(data))
+        made, same = DECODERS[kind](data), convert(message_type.decode(data))
         assert made == same and repr(made) == repr(same) and hash(made) == hash(same)
         assert {k: type(v) for k, v in vars(made).items()} == {
             k: type(v) for k, v in vars(same).items()
@@ -183,12 +184,12 @@ def test_samples_from_the_bytes_are_those_of_the_generated_types(kind):
     data = random_message(kind, random_).encode()
     for size in range(8, len(data)):
         with pytest.raises((struct.error, ValueError)):
-            samples.DECODERS[kind](data[:size])
+            DECODERS[kind](data[:size])
     if kind != "pose_t":  # a length that is negative, or more than is there
         at = {"planar_lidar_t": 16, "odometry_t": 56}[kind]
         for length in (-1, 2**31 - 1):
             with pytest.raises((struct.error, ValueError)):
-                samples.DECODERS[kind](data[:at] + struct.pack(">i", length) + data[at + 4 :])
+                DECODERS[kind](data[:at] + struct.pack(">i", length) + data[at + 4 :])
 
 
 STEPS = """

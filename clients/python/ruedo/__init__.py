@@ -27,7 +27,6 @@ except ImportError as _error:
     ) from _error
 from . import markers
 from .callbacks import Subscription
-from .control import State
 from .errors import (
     LaunchError,
     LeaseLost,
@@ -72,12 +71,13 @@ from .samples import (
     Odometry,
     OdometryTwist,
     Pose,
-    Sample,
     Scan,
     SonarReading,
+    State,
 )
 from .simulation import Simulation, connect
 from .stream import Reader, Stream
+from .values import Sample
 from .world import World
 from .world_info import Body
 

@@ -6,14 +6,12 @@ import random
 import struct
 import threading
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
 from .decoding import decode
 from .errors import NotSupported, RequestError, RunEnded, Timeout, TypeMismatch, for_terminal
-from .geometry import Floats
-from .samples import Value, floats
+from .samples import REPLIES, State
 
 if TYPE_CHECKING:
     from .connection import Connection
@@ -35,29 +33,6 @@ _REQUEST = struct.Struct(
 _REQUEST_FINGERPRINT = lcmtypes.request_t._get_packed_fingerprint()
 _KINDS = _names(lcmtypes.request_t)
 _CODES = _names(lcmtypes.reply_t)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class State(Value):
-    """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
-    "").
-    """
-
-    utime: int  # us, sim time
-    step: int  # number of the state
-    state_hash: int  # of all bodies' and robots' state
-    paused: bool
-    rate: float  # sim time per real time that is asked for; inf: as fast as it goes
-    name: str
-    position: Floats  # (3,) m, world
-    orientation: Floats  # (4,) w, x, y, z: to world
-    linear: Floats  # (3,) m/s, world
-    angular: Floats  # (3,) rad/s, world
-
-    @property
-    def time(self) -> float:
-        """Sim time, s."""
-        return self.utime * 1e-6
 
 
 class Session:
@@ -226,22 +201,15 @@ class Session:
         raise RequestError(f"{kind}: {reply.text or code}", code)
 
 
-def state_of(reply: Any) -> State:
+def reply_of(reply: Any, type: str) -> Any:
+    """The body of a reply. Raises TypeMismatch."""
+    message_type, convert = REPLIES[type]
     try:
-        m = decode(lcmtypes.state_reply_t, reply.body)
+        return convert(decode(message_type, reply.body))
     except Exception:
-        raise TypeMismatch(
-            "the reply's body is no state_reply_t of this client's version"
-        ) from None
-    return State(
-        m.utime,
-        m.step,
-        m.state_hash,
-        m.paused,
-        m.rate,
-        m.name,
-        floats(m.position),
-        floats(m.orientation),
-        floats(m.linear),
-        floats(m.angular),
-    )
+        raise TypeMismatch(f"the reply's body is no {type} of this client's version") from None
+
+
+def state_of(reply: Any) -> State:
+    state: State = reply_of(reply, "state_reply_t")
+    return state

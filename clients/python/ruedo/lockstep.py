@@ -22,7 +22,7 @@ import numpy as np
 from . import arrivals, lcmtypes
 from .arguments import shown
 from .channel_names import ChannelNames
-from .control import State, state_of
+from .control import state_of
 from .decoding import decode
 from .errors import (
     LeaseLost,
@@ -34,6 +34,7 @@ from .errors import (
     TypeMismatch,
     for_terminal,
 )
+from .samples import State
 from .stream import Stream, sample_of
 
 if TYPE_CHECKING:

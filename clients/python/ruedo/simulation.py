@@ -17,11 +17,12 @@ from . import arguments, control, lcmtypes
 from .address import resolve_url
 from .callbacks import Subscription
 from .connection import Connection, PrivateServer
-from .control import State
 from .errors import NotSupported, RunEnded
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
+from .requests import Requests
 from .robot import Robot
+from .samples import State
 from .transport import Transport
 from .world_info import Body, WorldInfo
 
@@ -40,7 +41,7 @@ def connect(url: str | None = None, *, name: str | None = None, timeout: float =
     return Simulation(at, own, arguments.number("timeout", timeout))
 
 
-class Simulation:
+class Simulation(Requests):
     """A running simulation. Made by connect() or launch(); safe to use from any thread.
 
     Works as a context manager; close() (or leaving it) ends a server that launch() started.
@@ -134,13 +135,6 @@ class Simulation:
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.
 
-    def pause(self) -> None:
-        """Stops sim time after the current step."""
-        self._session.request(lcmtypes.request_t.PAUSE)
-
-    def resume(self) -> None:
-        self._session.request(lcmtypes.request_t.RESUME)
-
     def step(
         self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0
     ) -> Observations:
@@ -174,12 +168,6 @@ class Simulation:
     def lockstep(self) -> bool:
         """Whether the server runs in lockstep."""
         return self._connection.in_lockstep
-
-    def set_rate(self, rate: float) -> None:
-        """Sim time per real time, > 0; math.inf: as fast as it goes."""
-        body = lcmtypes.rate_request_t()
-        body.rate = arguments.number("rate", rate)
-        self._session.request(lcmtypes.request_t.RATE, body)
 
     def show(self, width: int | str = "100%", height: int = 500) -> Any:
         """The console of a server that was launched with ``view=True``: in a notebook below the
@@ -237,10 +225,11 @@ class Simulation:
         return control.state_of(reply).name
 
     def remove(self, name: str) -> None:
-        """Takes a model away."""
         before = self._info
-        self._session.request(lcmtypes.request_t.REMOVE, _name_body(name))
+        super().remove(name)
         self._connection.refresh_info(before)
+
+    remove.__doc__ = Requests.remove.__doc__
 
     def set_pose(
         self,
@@ -264,28 +253,6 @@ class Simulation:
         )
         self._session.request(lcmtypes.request_t.SET_POSE, body)
 
-    def set_twist(
-        self, name: str, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)
-    ) -> None:
-        """Gives a model a velocity (m/s) and a turn rate (rad/s), in the world."""
-        body = lcmtypes.set_twist_request_t()
-        body.name = arguments.text("name", name)
-        body.linear = arguments.numbers("linear", linear, 3)
-        body.angular = arguments.numbers("angular", angular, 3)
-        self._session.request(lcmtypes.request_t.SET_TWIST, body)
-
-    def state(self, name: str = "") -> State:
-        """Time, step and state hash, and pose and twist of a model or MODEL/LINK when one is
-        named.
-        """
-        return control.state_of(
-            self._session.request(lcmtypes.request_t.GET_STATE, _name_body(name))
-        )
-
-    def reset_odometry(self, robot: str) -> None:
-        """Sets a robot's odometry to zero where it stands."""
-        self._session.request(lcmtypes.request_t.RESET_ODOMETRY, _name_body(robot))
-
     def markers(
         self, layer: str, markers: Iterable[lcmtypes.marker_t] = (), frame: str = ""
     ) -> None:
@@ -301,31 +268,19 @@ class Simulation:
             raise NotSupported("this server takes no markers")
         self._connection.bus.publish(channel.name, message.encode())
 
-    def snapshot(self, name: str) -> State:
-        """Saves the state under a name, in the folder that the server was started with
-        (`--snapshots FOLDER`), and returns it."""
-        return control.state_of(
-            self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0)
-        )
-
     def restore(self, name: str) -> State:
-        """Puts the world back to a snapshot; what follows equals what followed it. A new epoch.
-
-        A snapshot that the same user's server saved takes milliseconds. In the cases that
-        docs/determinism.md names the server repeats the snapshot's run from its beginning, without
-        publishing, at rate max.
-        """
-        state = control.state_of(
-            self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0)
-        )
+        state = super().restore(name)
         self._connection.clock.reset(state.utime)
         self._connection.stepper.forget()
         return state
 
+    restore.__doc__ = Requests.restore.__doc__
+
     def quit(self) -> None:
-        """Ends the server."""
         with contextlib.suppress(RunEnded):  # its last word may come before the reply, or without
-            self._session.request(lcmtypes.request_t.QUIT)
+            super().quit()
+
+    quit.__doc__ = Requests.quit.__doc__
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch()
@@ -352,12 +307,6 @@ class Simulation:
     @property
     def _info(self) -> WorldInfo:
         return self._connection.info
-
-
-def _name_body(name: str) -> Any:
-    body = lcmtypes.name_request_t()
-    body.name = arguments.text("name", name)
-    return body
 
 
 def _about_z(heading: float) -> list[float]:

@@ -17,6 +17,7 @@ from .arguments import shown
 from .callbacks import Callbacks, Subscription
 from .decoding import decode
 from .errors import RuedoError, Timeout, TypeMismatch
+from .fast_decoding import DECODERS
 
 if TYPE_CHECKING:
     from .connection import Connection
@@ -194,7 +195,7 @@ class Stream(Reader[T]):
                     f'robot.stream("{name}", raw=True) gives the bytes'
                 )
             message, convert = samples.CONVERSIONS[self.type]
-            make = samples.DECODERS.get(self.type, lambda data: convert(decode(message, data)))
+            make = DECODERS.get(self.type, lambda data: convert(decode(message, data)))
             self._given = Form(message._get_packed_fingerprint(), make, None)
         return self._given
 

@@ -51,6 +51,25 @@ public final class VectorsRunner {
                             (s.ranges.length == 0
                                     ? new double[0]
                                     : new double[] {s.angle(0), s.angle(s.ranges.length - 1)}));
+        } else if (sample instanceof LidarScan) {
+            LidarScan s = (LidarScan) sample;
+            row("shape", s.layers, s.columns);
+            row("ranges", (Object) s.ranges);
+            row("intensities", (Object) s.intensities);
+            row("azimuths", s.azimuthMin, s.azimuthMin + s.azimuthStep * (s.columns - 1));
+            row("elevations", s.elevationMin, s.elevationMin + s.elevationStep * (s.layers - 1));
+        } else if (sample instanceof Image) {
+            Image s = (Image) sample;
+            row("picture", s.width, s.height, s.rowStride);
+            System.out.println("format " + s.format);
+            int[] data = new int[s.data.length];
+            for (int i = 0; i < data.length; i++) data[i] = s.data[i] & 255;
+            row("data", (Object) data);
+        } else if (sample instanceof CameraInfo) {
+            CameraInfo s = (CameraInfo) sample;
+            row("picture", s.width, s.height);
+            row("focus", s.fx, s.fy, s.cx, s.cy);
+            row("distortion", (Object) s.distortion);
         } else if (sample instanceof SonarReading) {
             SonarReading s = (SonarReading) sample;
             row("ranges", (Object) s.ranges);
@@ -209,6 +228,10 @@ public final class VectorsRunner {
         try {
             Robot robot = sim.robot("p3at");
             for (int i = 1; i < args.length; i++) {
+                if (args[i].equals("pause")) {
+                    sim.pause();
+                    continue;
+                }
                 long n = Long.parseLong(args[i]);
                 Observations seen =
                         sim.step(
@@ -235,6 +258,8 @@ public final class VectorsRunner {
                     error.getClass() == RuedoException.class
                             ? "RuedoError"
                             : error.getClass().getSimpleName();
+            if (error.getClass() == RuedoException.RequestError.class)
+                kind += " " + ReplyCode.text(((RuedoException.RequestError) error).code);
             System.err.println(kind + ": " + error.getMessage());
         }
         Runtime.getRuntime().halt(0);

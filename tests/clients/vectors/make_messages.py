@@ -214,8 +214,93 @@ CASES = [
         dict(utime=8, id=0, kind=17, state=1, reason=0, done=0.0, remaining=0.0, v=0.0, omega=0.0),
         "utime 8|id 0|wheels running |amounts 0.000000 0.000000|twist 0.000000 0.000000",
     ),
+    (
+        "lidar_t",
+        dict(
+            utime=18,
+            nlayers=2,
+            ncolumns=3,
+            nranges=6,
+            ranges=[1.0, 2.0, 3.0, INF, 5.0, -INF],
+            nintensities=6,
+            intensities=[0.0, 0.25, 0.5, 0.75, 1.0, 0.125],
+            azimuth0=-0.5,
+            azimuth_step=0.5,
+            elevation0=-0.25,
+            elevation_step=0.25,
+        ),
+        "utime 18|shape 2 3|ranges 1.000000 2.000000 3.000000 inf 5.000000 -inf|intensities 0.000000 0.250000 0.500000 0.750000 1.000000 0.125000"
+        "|azimuths -0.500000 0.500000|elevations -0.250000 0.000000",
+    ),
+    (
+        "camera_info_t",
+        dict(
+            utime=19,
+            width=320,
+            height=240,
+            fx=277.5,
+            fy=278.5,
+            cx=160.5,
+            cy=120.5,
+            distortion=[0.5, -0.25, 0.125, 0.0625, -0.5],
+            near_clip=0.25,
+            far_clip=50.0,
+        ),
+        "utime 19|picture 320 240|focus 277.500000 278.500000 160.500000 120.500000|distortion 0.500000 -0.250000 0.125000 0.062500 -0.500000",
+    ),
 ]
 
+# The enumerations, by hand: numbers in messages and the texts of the samples.
+KINDS = {
+    0: "none",
+    1: "advance",
+    2: "rotate",
+    3: "heading",
+    4: "arc",
+    5: "stop",
+    16: "velocity",
+    17: "wheels",
+}
+STATES = {0: "idle", 1: "running", 2: "done", 3: "ended", 4: "refused"}
+REASONS = {
+    0: "",
+    1: "replaced",
+    2: "blocked",
+    3: "watchdog",
+    4: "not finite",
+    5: "bad kind",
+    6: "bad value",
+    7: "no drive",
+    8: "not possible",
+}
+FORMATS = {
+    842221382: "float32",
+    859981650: "rgb",
+    861030210: "bgr",
+    909199180: "gray16",
+    1196444237: "jpeg",
+    1497715271: "gray",
+}
+
+
+def motion(kind, state, reason):
+    values = dict(utime=1, id=2, kind=kind, state=state, reason=reason)
+    values |= dict(done=0.0, remaining=0.0, v=0.0, omega=0.0)
+    words = f"{KINDS[kind]} {STATES[state]} {REASONS[reason]}"
+    zeros = "amounts 0.000000 0.000000|twist 0.000000 0.000000"
+    return "motion_status_t", values, f"utime 1|id 2|{words}|{zeros}"
+
+
+def picture(number, name):
+    values = dict(utime=3, width=2, height=1, row_stride=6, pixelformat=number, size=3)
+    values |= dict(data=bytes([1, 127, 255]), nmetadata=0, metadata=[])
+    return "image_t", values, f"utime 3|picture 2 1 6|format {name}|data 1 127 255"
+
+
+CASES += [motion(kind, 1, 0) for kind in KINDS]
+CASES += [motion(1, state, 0) for state in STATES]
+CASES += [motion(1, 4, reason) for reason in REASONS]
+CASES += [picture(number, name) for number, name in FORMATS.items()]
 
 PARTS = {
     "contact_t": "contact_point_t",
@@ -224,6 +309,9 @@ PARTS = {
     "boxes_2d_t": "box_2d_t",
     "boxes_3d_t": "box_3d_t",
 }
+
+
+UNREAD = {"camera_info_t": 16, "image_t": 4}  # bytes at the end that C++ and Java pass over
 
 
 def message(type, values):
@@ -241,8 +329,9 @@ def main():
     for type, values, meaning in CASES:
         encoded = message(type, values).encode()
         lines += [f"{type} {encoded.hex()}", *("  " + line for line in meaning.split("|"))]
+        end = UNREAD.get(type, 0) + 1
         lines += [
-            f"{type} {encoded[:-1].hex()}",
+            f"{type} {encoded[:-end].hex()}",
             "  broken",
             f"{type} {encoded[:7].hex()}",
             "  broken",
@@ -251,6 +340,8 @@ def main():
     for type, at in (
         ("planar_lidar_t", 16),
         ("sonar_t", 16),
+        ("lidar_t", 24),
+        ("image_t", 32),
         ("odometry_t", 56),
         ("contact_t", 17),
         ("collisions_t", 31),

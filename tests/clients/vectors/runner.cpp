@@ -39,6 +39,10 @@ const SampleType* as(const std::string& type, const Sample& sample) {
   return type == message_type<SampleType>() ? static_cast<const SampleType*>(&sample) : nullptr;
 }
 
+std::vector<double> last_and_first(double first, double step, int count) {
+  return {first, first + step * (count - 1)};
+}
+
 void mean(const std::string& type, const Sample& sample) {
   row("utime", std::vector{sample.utime});
   if (const auto* scan = as<Scan>(type, sample)) {
@@ -47,6 +51,20 @@ void mean(const std::string& type, const Sample& sample) {
     row("angles", scan->ranges.empty()
                       ? std::vector<double>()
                       : std::vector{scan->angle(0), scan->angle(scan->ranges.size() - 1)});
+  } else if (const auto* lidar = as<LidarScan>(type, sample)) {
+    row("shape", std::vector{lidar->layers, lidar->columns});
+    row("ranges", lidar->ranges);
+    row("intensities", lidar->intensities);
+    row("azimuths", last_and_first(lidar->azimuth_min, lidar->azimuth_step, lidar->columns));
+    row("elevations", last_and_first(lidar->elevation_min, lidar->elevation_step, lidar->layers));
+  } else if (const auto* image = as<Image>(type, sample)) {
+    row("picture", std::vector{image->width, image->height, image->row_stride});
+    std::printf("format %s\n", to_string(image->format));
+    row("data", std::vector<int32_t>(image->data.begin(), image->data.end()));
+  } else if (const auto* camera = as<CameraInfo>(type, sample)) {
+    row("picture", std::vector{camera->width, camera->height});
+    row("focus", std::vector{camera->fx, camera->fy, camera->cx, camera->cy});
+    row("distortion", camera->distortion);
   } else if (const auto* sonar = as<SonarReading>(type, sample)) {
     row("ranges", sonar->ranges);
     row("fired_utime", sonar->fired_utime);
@@ -194,6 +212,10 @@ void converse(int argc, char** argv) {
   try {
     const Robot robot = sim.robot("p3at");
     for (int i = 2; i < argc; ++i) {
+      if (std::string(argv[i]) == "pause") {
+        sim.pause();
+        continue;
+      }
       const int64_t n = std::atoll(argv[i]);
       const Observations seen = sim.step(
           n,
@@ -214,7 +236,9 @@ void converse(int argc, char** argv) {
   } catch (const NoServer& error) {
     std::fprintf(stderr, "NoServer: %s\n", error.what());
   } catch (const RequestError& error) {
-    std::fprintf(stderr, "RequestError: %s\n", error.what());
+    std::fprintf(stderr, "RequestError %s: %s\n", to_string(error.code), error.what());
+  } catch (const NotSupported& error) {
+    std::fprintf(stderr, "NotSupported: %s\n", error.what());
   } catch (const Error& error) {
     std::fprintf(stderr, "RuedoError: %s\n", error.what());
   }

@@ -30,6 +30,20 @@ def meaning(type, s):
         yield row("ranges", floats(s.ranges))
         yield row("intensities", floats(s.intensities))
         yield row("angles", floats([s.angles[0], s.angles[-1]]) if len(s.ranges) else [])
+    elif type == "lidar_t":
+        yield row("shape", s.ranges.shape)
+        yield row("ranges", floats(s.ranges.ravel()))
+        yield row("intensities", floats(s.intensities.ravel()))
+        yield row("azimuths", floats([s.azimuths[0], s.azimuths[-1]]))
+        yield row("elevations", floats([s.elevations[0], s.elevations[-1]]))
+    elif type == "image_t":
+        yield row("picture", [s.width, s.height, s.row_stride])
+        yield f"format {s.format}"
+        yield row("data", s.data)
+    elif type == "camera_info_t":
+        yield row("picture", [s.width, s.height])
+        yield row("focus", [s.fx, s.fy, s.cx, s.cy])
+        yield row("distortion", floats(s.distortion))
     elif type == "sonar_t":
         yield row("ranges", floats(s.ranges))
         yield row("fired_utime", s.fired_utime)
@@ -156,11 +170,15 @@ def converse(steps):
     try:
         robot = sim.robot("p3at")
         for n in steps:
+            if n == "pause":
+                sim.pause()
+                continue
             seen = sim.step(int(n), [robot.velocity_command(0.5, 0.0)] if int(n) else [], 300.0)
             said = [f"{m.step}:{m.channel}:{zlib.crc32(m.data)}" for m in seen.messages]
             print("step", seen.step, seen.utime, seen.state_hash, *said, file=sys.stderr)
     except ruedo.RuedoError as error:
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        code = f" {error.code}" if type(error) is ruedo.RequestError else ""
+        print(f"{type(error).__name__}{code}: {error}", file=sys.stderr)
 
 
 decode() if sys.argv[1] == "decode" else converse(sys.argv[2:])

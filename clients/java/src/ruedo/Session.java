@@ -304,4 +304,19 @@ final class Session {
         if (reply.code == reply_t.NOT_SUPPORTED) throw new RuedoException.NotSupported(text);
         throw new RuedoException.RequestError(text, reply.code);
     }
+
+    /** What a reply says; type is the name of the body's. Throws TypeMismatch. */
+    static <T> T body(reply_t reply, String type, long fingerprint, Conversions.Reader<T> reader) {
+        try {
+            WireReader in = new WireReader(reply.body);
+            if (in.int64() != fingerprint) throw new IOException("another version of the type");
+            return reader.read(in);
+        } catch (IOException error) {
+            throw new RuedoException.TypeMismatch(
+                    "the reply's body is no "
+                            + type
+                            + " of this client's version: "
+                            + error.getMessage());
+        }
+    }
 }

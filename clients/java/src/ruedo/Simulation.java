@@ -1,14 +1,10 @@
 package ruedo;
 
-import ruedo.lcmtypes.Message;
 import ruedo.lcmtypes.channel_info_t;
-import ruedo.lcmtypes.name_request_t;
-import ruedo.lcmtypes.rate_request_t;
 import ruedo.lcmtypes.request_t;
 import ruedo.lcmtypes.reset_request_t;
 import ruedo.lcmtypes.robot_info_t;
 import ruedo.lcmtypes.set_pose_request_t;
-import ruedo.lcmtypes.set_twist_request_t;
 import ruedo.lcmtypes.spawn_request_t;
 import ruedo.lcmtypes.step_request_t;
 import ruedo.lcmtypes.tick_t;
@@ -31,7 +27,7 @@ import java.util.function.Supplier;
  * ends a server that launch() started. Requests throw NotSupported where the server does not have
  * them, RequestError when it refuses.
  */
-public final class Simulation implements AutoCloseable {
+public final class Simulation extends Requests implements AutoCloseable {
     private static final double SILENCE_SECONDS =
             5.0; // without any message: a server gives a sign of life each second
     private static final long SEEK_NANOS = 1_000_000_000;
@@ -42,7 +38,6 @@ public final class Simulation implements AutoCloseable {
     private static final long TURN_MILLIS = 100; // of the receiving thread
     private static final long TURN_IN_USE_MILLIS = 10;
     private static final double SLOW_REPLY_SECONDS = 60.0;
-    private static final double RESTORE_SECONDS = 3600.0;
 
     static {
         if ("1".equals(System.getenv("RUEDO_REGRESS"))) ProgramEnd.comesWithTheRun();
@@ -217,16 +212,6 @@ public final class Simulation implements AutoCloseable {
 
     // Control.
 
-    /** Stops sim time after the current step. */
-    public void pause() {
-        session.request(request_t.PAUSE, null, REPLY_SECONDS);
-    }
-
-    /** Goes on. */
-    public void resume() {
-        session.request(request_t.RESUME, null, REPLY_SECONDS);
-    }
-
     /** {@link #step(long, List)} without commands. */
     public Observations step(long n) {
         return step(n, List.of());
@@ -259,19 +244,12 @@ public final class Simulation implements AutoCloseable {
         step_request_t body = new step_request_t();
         body.steps = n;
         return new Observations(
-                State.of(session.request(request_t.STEP, body, timeout)), List.of());
+                Decoders.stateOf(session.request(request_t.STEP, body, timeout)), List.of());
     }
 
     /** Whether the server runs in lockstep. */
     public boolean lockstep() {
         return info().supports(request_t.GRANT);
-    }
-
-    /** Sim time per real time, > 0; {@link Double#POSITIVE_INFINITY}: as fast as it goes. */
-    public void setRate(double rate) {
-        rate_request_t body = new rate_request_t();
-        body.rate = rate;
-        session.request(request_t.RATE, body, REPLY_SECONDS);
     }
 
     /** What a reset resets. */
@@ -332,15 +310,16 @@ public final class Simulation implements AutoCloseable {
         body.orientation = orientation;
         body.on_ground = onGround;
         WorldInfo before = known;
-        String given = State.of(session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS)).name;
+        String given =
+                Decoders.stateOf(session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS)).name;
         refreshInfo(before);
         return given;
     }
 
-    /** Takes a model away. */
+    @Override
     public void remove(String name) {
         WorldInfo before = known;
-        session.request(request_t.REMOVE, nameBody(name), REPLY_SECONDS);
+        super.remove(name);
         refreshInfo(before);
     }
 
@@ -356,30 +335,6 @@ public final class Simulation implements AutoCloseable {
         body.position = position;
         body.orientation = orientation;
         session.request(request_t.SET_POSE, body, REPLY_SECONDS);
-    }
-
-    /** Gives a model a velocity (m/s) and a turn rate (rad/s), in the world. */
-    public void setTwist(String name, double[] linear, double[] angular) {
-        set_twist_request_t body = new set_twist_request_t();
-        body.name = name;
-        body.linear = linear;
-        body.angular = angular;
-        session.request(request_t.SET_TWIST, body, REPLY_SECONDS);
-    }
-
-    /** Time, step and state hash. */
-    public State state() {
-        return state("");
-    }
-
-    /** The same, with pose and twist of a model or MODEL/LINK. */
-    public State state(String name) {
-        return State.of(session.request(request_t.GET_STATE, nameBody(name), REPLY_SECONDS));
-    }
-
-    /** Sets a robot's odometry to zero where it stands. */
-    public void resetOdometry(String robot) {
-        session.request(request_t.RESET_ODOMETRY, nameBody(robot), REPLY_SECONDS);
     }
 
     /**
@@ -405,31 +360,18 @@ public final class Simulation implements AutoCloseable {
         markers(layer, markers, "");
     }
 
-    /**
-     * Saves the state under a name, in the folder that the server was started with (--snapshots
-     * FOLDER), and returns it.
-     */
-    public State snapshot(String name) {
-        return State.of(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
-    }
-
-    /**
-     * Restores a snapshot; what follows equals what followed the snapshot. Begins a new epoch. A
-     * snapshot that the same user's server saved takes milliseconds. In the cases that
-     * docs/determinism.md names the server repeats the snapshot's run from its beginning, without
-     * publishing, at rate max.
-     */
+    @Override
     public State restore(String name) {
-        State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
+        State state = super.restore(name);
         clock.reset(state.utime);
         stepper.forget();
         return state;
     }
 
-    /** Ends the server. */
+    @Override
     public void quit() {
         try {
-            session.request(request_t.QUIT, null, REPLY_SECONDS);
+            super.quit();
         } catch (RuedoException.RunEnded ended) {
             // its last word may come before the reply, or without
         }
@@ -498,6 +440,11 @@ public final class Simulation implements AutoCloseable {
     }
 
     // For the package's other classes.
+
+    @Override
+    Session session() {
+        return session;
+    }
 
     WorldInfo info() {
         synchronized (news) {
@@ -873,12 +820,6 @@ public final class Simulation implements AutoCloseable {
                 deadline.waitOn(news, 100);
             }
         }
-    }
-
-    private static Message nameBody(String name) {
-        name_request_t body = new name_request_t();
-        body.name = name;
-        return body;
     }
 
     private static double[] aboutZ(double heading) {

@@ -238,7 +238,7 @@ final class Stepper {
     private void look(double timeout) {
         name_request_t body = new name_request_t();
         body.name = "";
-        State state = State.of(session.request(request_t.GET_STATE, body, timeout));
+        State state = Decoders.stateOf(session.request(request_t.GET_STATE, body, timeout));
         synchronized (this) {
             last = new long[] {state.utime, state.step, state.stateHash};
         }

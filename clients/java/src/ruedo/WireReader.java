@@ -87,6 +87,12 @@ final class WireReader {
         return n;
     }
 
+    /** Where an array does not have so many elements. */
+    static void checkProduct(int size, int rows, int columns) throws IOException {
+        if (rows < 0 || columns < 0 || (long) rows * columns != size)
+            throw new IOException("sizes that do not fit each other");
+    }
+
     String string() throws IOException {
         int length = count(1); // with its closing zero
         if (length == 0) throw new IOException("a string without an end");

@@ -1,0 +1,166 @@
+"""What samples compute from their fields, by the kind of sample. The classes themselves are made
+from proto/vocabulary.toml.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import notebook
+from .errors import NotSupported
+from .geometry import Floats, Placed, transformed
+
+if TYPE_CHECKING:
+    from .samples import ContactPoint
+
+
+class ScanMethods:
+    ranges: Floats
+    angles: Floats
+
+    def nearest(self, from_angle: float = -math.pi, to_angle: float = math.pi) -> float:
+        """The smallest range (m) between two angles (rad); +inf when nothing is there, -inf when
+        something is nearer than the device can measure."""
+        part = self.ranges[(self.angles >= from_angle) & (self.angles <= to_angle)]
+        return float(part.min()) if part.size else math.inf
+
+    def points(self, device: Placed | None = None, pose: Placed | None = None) -> Floats:
+        """Where the rays ended, of those that returned: (k, 2) m in the device's frame; with the
+        device (``robot.lrf``) (k, 3) in base_link, and with the robot's pose, too, in the world."""
+        good = np.isfinite(self.ranges)
+        ranges, angles = self.ranges[good], self.angles[good]
+        points = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
+        if device is None:
+            if pose is not None:
+                raise TypeError("points(pose=...) needs the device, too: points(robot.lrf, pose)")
+            return points
+        above = transformed(np.column_stack([points, np.zeros(len(points))]), device)
+        return above if pose is None else transformed(above, pose)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draws the scan, x upwards as the robot looks, y to the left. axes: matplotlib's; None:
+        new ones. Returns them. Needs matplotlib.
+        """
+        if axes is None:
+            try:
+                from matplotlib import pyplot
+            except ImportError:
+                raise NotSupported("plot() needs matplotlib: pip install matplotlib") from None
+            axes = pyplot.subplots()[1]
+        points = self.points()
+        axes.plot(-points[:, 1], points[:, 0], ".", markersize=3)
+        axes.plot(0.0, 0.0, "^", color="tab:red")
+        axes.set(aspect="equal", xlabel="to the right, m", ylabel="ahead, m")
+        return axes
+
+    def _repr_svg_(self) -> str:
+        return notebook.scan_svg(self.points())
+
+
+class OdometryMethods:
+    theta: float
+
+    @property
+    def heading(self) -> float:
+        """theta, wrapped as Pose.heading is: rad, counter-clockwise from odom's x axis, in [-pi,
+        pi].
+        """
+        return math.remainder(self.theta, math.tau)
+
+
+class PoseMethods:
+    position: Floats
+    orientation: Floats
+
+    @property
+    def x(self) -> float:
+        return float(self.position[0])
+
+    @property
+    def y(self) -> float:
+        return float(self.position[1])
+
+    @property
+    def heading(self) -> float:
+        """rad, counter-clockwise from the world's x axis, in (-pi, pi]."""
+        w, x, y, z = self.orientation
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+_RAW = {
+    "gray": ("u1", 1),
+    "rgb": ("u1", 3),
+    "bgr": ("u1", 3),
+    "gray16": ("<u2", 1),
+    "float32": ("<f4", 1),
+}
+
+
+class ImageMethods:
+    width: int
+    height: int
+    format: str
+    row_stride: int
+    data: bytes
+
+    def array(self) -> NDArray[Any]:
+        """The pixels, rows from the top: (height, width, 3) uint8 in the order R, G, B for "jpeg",
+        "rgb" and "bgr"; (height, width) uint8, uint16 or float32 for the others. Pictures in "jpeg"
+        need Pillow."""
+        if self.format == "jpeg":
+            try:
+                from PIL import Image as pillow  # type: ignore[import-not-found, unused-ignore]
+            except ImportError:
+                raise ImportError(
+                    "the picture is a JPEG: array() needs Pillow (pip install pillow); "
+                    "save(path) writes it without"
+                ) from None
+            import io
+
+            return np.asarray(pillow.open(io.BytesIO(self.data)).convert("RGB"))
+        if self.format not in _RAW:
+            raise ValueError(f"unknown pixel format {self.format}")
+        dtype, channels = _RAW[self.format]
+        pixel_bytes = np.dtype(dtype).itemsize * channels
+        stride = self.row_stride or self.width * pixel_bytes
+        if stride < self.width * pixel_bytes or len(self.data) < stride * self.height:
+            raise ValueError(
+                f"a {self.format} picture of {self.width} x {self.height} pixels needs more than "
+                f"{len(self.data)} bytes in rows of {stride}"
+            )
+        rows = np.frombuffer(self.data, np.uint8, stride * self.height).reshape(self.height, stride)
+        pixels = np.ascontiguousarray(rows[:, : self.width * pixel_bytes]).view(dtype)
+        if channels == 1:
+            return pixels
+        colour = pixels.reshape(self.height, self.width, channels)
+        return colour[:, :, ::-1] if self.format == "bgr" else colour
+
+    def _repr_jpeg_(self) -> bytes | None:
+        return self.data if self.format == "jpeg" else None
+
+    def _repr_png_(self) -> bytes | None:
+        return None if self.format == "jpeg" else notebook.png(notebook.visible(self.array()))
+
+    def save(self, path: str | Path) -> None:
+        """Writes a JPEG's bytes as they are. Raw 8-bit pictures are written as PPM or PGM."""
+        content = self.data
+        if self.format in ("rgb", "bgr", "gray"):
+            head = "P5" if self.format == "gray" else "P6"
+            content = f"{head} {self.width} {self.height} 255\n".encode() + self.array().tobytes()
+        elif self.format != "jpeg":
+            raise ValueError(f"{self.format} pictures have no common file format: use array()")
+        Path(path).write_bytes(content)
+
+
+class CollisionsMethods:
+    points: list[ContactPoint]
+
+    @property
+    def bodies(self) -> list[str]:
+        """The names of what is touched, each once, sorted; empty: nothing is."""
+        return sorted({point.body for point in self.points})

@@ -1,0 +1,44 @@
+/// @file
+// What samples of Ruedo's client for C++ are made of.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace ruedo::client {
+
+/// A span of time: any of std::chrono's, or a number of seconds. kForever has no end.
+class Duration : public std::chrono::duration<double> {
+ public:
+  /// @param seconds may be kForever
+  constexpr Duration(double seconds)
+      : std::chrono::duration<double>(seconds) {}  // NOLINT: both are meant to convert
+  /// @param time of std::chrono
+  template <class Rep, class Period>
+  constexpr Duration(std::chrono::duration<Rep, Period> time)
+      : std::chrono::duration<double>(time) {}  // NOLINT
+};
+
+inline constexpr double kForever = std::numeric_limits<double>::infinity();  ///< s
+inline constexpr double kFast =
+    std::numeric_limits<double>::infinity();  ///< a rate: as fast as it goes
+
+using Vector3 = std::array<double, 3>;     ///< x, y, z
+using Quaternion = std::array<double, 4>;  ///< w, x, y, z
+
+/// What all samples have.
+struct Sample {
+  int64_t utime = 0;  ///< us, sim time of the state shown
+  /// @return the same in s
+  double time() const { return static_cast<double>(utime) * 1e-6; }
+};
+
+/// A message of any type, as it came.
+struct RawSample : Sample {    // utime: where the type's first field is one; else 0
+  std::vector<uint8_t> bytes;  ///< LCM's encoding, its fingerprint first
+};
+
+}  // namespace ruedo::client
