@@ -2,7 +2,9 @@
 
 import os
 import subprocess
+from dataclasses import fields
 
+import numpy as np
 import pytest
 from conftest import HALL, PROBES, RUEDO, probe
 
@@ -42,6 +44,28 @@ def test_samples_by_channel(language, log):
         unknown = said.one("unknown")
         assert "UnknownName:" in unknown and "has no channel 'nobody'; it has " in unknown
         assert "TypeMismatch: p3at/pose carries " in said.one("mismatch")
+
+
+def test_columns_are_those_of_the_live_samples(tmp_path):
+    """What a program saw while it ran, and what pandas shows of the log: names and values."""
+    import ruedo
+
+    path = tmp_path / "run.lcm"
+    with ruedo.launch(HALL, lockstep=1, args=["--record", str(path)]) as sim:
+        robot = sim.robot("p3at")
+        streams = [robot.lrf, robot.sonar, robot.odometry, robot.odometry_twist, robot.pose]
+        streams += [robot.motion, robot.collisions, robot.camera]
+        seen = sim.step(40, [robot.velocity_command(0.5, 0.1)])
+        live = {stream.channel: seen.all(stream) for stream in streams}
+    frames = ruedo.read_log(path)
+    for channel, samples in live.items():
+        assert samples, channel
+        frame = frames[channel]
+        assert list(frame.columns) == [one.name for one in fields(samples[0])], channel
+        for sample, (time, row) in zip(samples, frame.iterrows()):
+            assert time == sample.time
+            for name, value in vars(sample).items():
+                assert np.array_equal(row[name], value), (channel, name)
 
 
 def test_a_log_that_was_cut_off_is_read_up_to_there(language, log, tmp_path):

@@ -703,8 +703,10 @@ def test_a_log_as_pandas_has_it(tmp_path):
     assert (
         list(frame["x"]) == [0.0, 0.5, 1.0]
         and list(frame.index) == pytest.approx([0.0, 0.02, 0.04])
-        and frame["angle"].iloc[2] == [2.0]
+        and frame["wheel_angles"].iloc[2] == [2.0]
     )
+    members = ruedo.read_log(tmp_path / "run.lcm", raw=True)["p3at/odometry"]
+    assert members["angle"].iloc[2] == [2.0] and "wheel_angles" not in members
     assert ruedo.read_log(tmp_path / "run.lcm", ["nothing"]) == {}
 
 

@@ -12,6 +12,7 @@ from . import lcmtypes
 from .decoding import decode
 from .errors import NotSupported
 from .files import open_regular
+from .samples import CONVERSIONS
 
 EVENT = b"\xed\xa1\xda\x01"  # that LCM's logs begin each message with
 _HEAD = struct.Struct(
@@ -62,11 +63,17 @@ def events(path: str | os.PathLike[str]) -> Iterator[Event]:
             at += _HEAD.size + name_size + data_size
 
 
-def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) -> dict[str, Any]:
+def read_log(
+    path: str | os.PathLike[str], channels: list[str] | None = None, raw: bool = False
+) -> dict[str, Any]:
     """The messages of a log, a DataFrame for each channel: the index is `time` (s of sim time), the
-    columns are the type's fields; an array's cells are lists. channels: those that are wanted,
-    None: all whose type is one of Ruedo's. A log that is damaged or was cut off is read up to there
-    and no further, which is logged as a warning.
+    columns are the fields of the samples that a stream of that channel delivers, with their units
+    and values (`log["p3at/pose"]["position"]` has arrays (3,)); of what no stream delivers, such as
+    ruedo/header, the members of the message, with lists for arrays.
+
+    channels: those that are wanted, None: all whose type is one of Ruedo's. raw: the members of the
+    message for all of them. A log that is damaged or was cut off is read up to there and no
+    further, which is logged as a warning.
 
     Needs pandas (pip install 'ruedo[logs]'). Raises ValueError for a file that is no log. A message
     that is no valid one of its type is left out.
@@ -97,12 +104,10 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
         if message_type is None or (channels is not None and event.channel not in channels):
             continue
         try:
-            message = decode(message_type, event.data)
+            row = _row(message_type, event.data, raw)
         except Exception:
             continue
-        rows.setdefault(event.channel, []).append(
-            {name: _plain(getattr(message, name)) for name in message.__slots__}
-        )
+        rows.setdefault(event.channel, []).append(row)
     frames = {}
     for channel, all_of_it in rows.items():
         frame = pandas.DataFrame(all_of_it)
@@ -110,6 +115,15 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
             frame.index = pandas.Index(frame["utime"] * 1e-6, name="time")
         frames[channel] = frame
     return frames
+
+
+def _row(message_type: Any, data: bytes, raw: bool) -> dict[str, Any]:
+    """By columns. Raises when the bytes are not a message of the type."""
+    message = decode(message_type, data)
+    own, convert = CONVERSIONS.get(message_type.__name__, (None, None))
+    if own is message_type and convert and not raw:
+        return vars(convert(message))
+    return {name: _plain(getattr(message, name)) for name in message.__slots__}
 
 
 def _plain(value: Any) -> Any:

@@ -485,7 +485,7 @@ def read_log(path):
     say("channels", " ".join(sorted(log)))
     scans, poses = log["p3at/lrf"], log["p3at/pose"]
     say("scans", len(scans), len(scans), scans["utime"].iloc[-1], scans["ranges"].iloc[-1][90])
-    say("poses", len(poses), poses["utime"].iloc[-1], poses["pos"].iloc[-1][0])
+    say("poses", len(poses), poses["utime"].iloc[-1], poses["position"].iloc[-1][0])
 
 
 def apart(url, name):
