@@ -2,6 +2,7 @@
 says what is kept).
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -69,3 +70,75 @@ def test_its_client_drives_this_server():
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == "0.5 181\n"
+
+
+# What programs and other versions build on (docs/compatibility.md): types by members and constants;
+# names of the package, and of the members of its classes.
+INVENTORY = """
+import inspect, json, ruedo
+types = {
+    name: {
+        "fingerprint": type._get_packed_fingerprint().hex(),
+        "constants": {n: v for n, v in vars(type).items() if n.isupper() and isinstance(v, int)},
+    }
+    for name, type in vars(ruedo.lcmtypes).items()
+    if hasattr(type, "_get_packed_fingerprint")
+}
+names = {}
+for name in ruedo.__all__:
+    one = getattr(ruedo, name)
+    members = list(inspect.signature(one).parameters) if inspect.isfunction(one) else dir(one)
+    names[name] = [m for m in members if not m.startswith("_")] if name != "lcmtypes" else []
+    fields = getattr(one, "__dataclass_fields__", None)
+    names[name] += list(fields) if fields else []
+print(json.dumps([types, names]))
+"""
+
+
+def inventory(place):
+    done = subprocess.run(
+        [sys.executable, "-c", INVENTORY],
+        env={**os.environ, "PYTHONPATH": str(place)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_types_and_names_of_the_last_version_are_still_there():
+    (old_types, old_names), (types, names) = (
+        inventory(place) for place in (HERE / "client.zip", BUILD / "python")
+    )
+    assert len(old_types) > 40 and len(old_names) > 40
+    for name, old in old_types.items():
+        assert types[name]["fingerprint"] == old["fingerprint"], f"{name} has other members"
+        for constant, value in old["constants"].items():
+            assert types[name]["constants"].get(constant) == value, f"{name}.{constant}"
+    for name, members in old_names.items():
+        assert set(members) <= set(names[name]), f"ruedo.{name}"
+
+
+def test_its_client_makes_requests_and_steps_in_lockstep():
+    code = (
+        "import ruedo\n"
+        "with ruedo.launch('arena', seed=1) as sim:\n"
+        "    sim.pause(); sim.step(10); sim.set_rate(2.0)\n"
+        "    sim.set_pose('p3at', 1.0, 0.5); sim.reset_odometry('p3at')\n"
+        "    print(sim.state('p3at').position[:2].tolist())\n"
+        "    try: sim.remove('nobody')\n"
+        "    except ruedo.RequestError as error: print(error.code)\n"
+        "with ruedo.launch('arena', lockstep=1, seed=1) as sim:\n"
+        "    print(sim.step(100).step)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(HERE / "client.zip"), "RUEDO": str(RUEDO)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "[1.0, 0.5]\nUNKNOWN_NAME\n100\n"
