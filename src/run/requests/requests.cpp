@@ -21,6 +21,11 @@ class RequestTable {
     return (run.*function)(request);
   }
 
+  template <Outcome (*function)(Run&)>
+  static Outcome of(Run& run, const request_t&, const Session&) {
+    return function(run);
+  }
+
   template <class Body, Outcome (Run::*function)(const request_t&, const Body&)>
   static Outcome with(Run& run, const request_t& request, const Session&) {
     Body body;
