@@ -31,7 +31,7 @@ class SdistWithTypes(sdist):
 
 
 # With proto/ at hand the build makes the types; from an sdist they are a package like any other.
-packages = ["ruedo", "ruedo.campaign", "ruedo.gym", "ruedo.hunt"] + (
+packages = ["ruedo", "ruedo.campaign", "ruedo.fit", "ruedo.gym", "ruedo.hunt"] + (
     [] if PROTO.is_dir() else ["ruedo.lcmtypes"]
 )
 version = (

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .terminal import drop, flush, say, tell
+from ..terminal import drop, flush, say, tell
 
 MOST_WORKERS = 100_000
 GOOD, FAILED, USAGE, BAD_INPUT, ENVIRONMENT = range(5)

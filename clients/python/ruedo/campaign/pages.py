@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..launch import find_ruedo
+from ..terminal import tell
 from .local import Crew
 from .plan import Case
-from .terminal import tell
 
 _MOST_MB = 5  # of a page
 

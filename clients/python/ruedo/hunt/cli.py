@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..campaign.cli import MOST_WORKERS, number
 from ..campaign.errors import CampaignError
 from ..campaign.plan import MOST_CASES
-from ..campaign.terminal import say, tell
+from ..terminal import say, tell
 
 if TYPE_CHECKING:
     from .hunt import Found

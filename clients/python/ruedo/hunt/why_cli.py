@@ -8,7 +8,7 @@ from typing import Any
 
 from ..campaign.cli import number
 from ..campaign.outputs import check_output
-from ..campaign.terminal import say
+from ..terminal import say
 
 
 def add_why(commands: Any) -> None:

@@ -1,5 +1,5 @@
-// ruedo campaign, hunt and why: written in Python, in the package `ruedo` of this installation,
-// which this hands over to.
+#include "cli/support/python.h"
+
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "cli/support/commands.h"
 #include "ruedo/errors.h"
 #include "system/installation.h"
 
@@ -18,13 +17,13 @@ namespace {
 namespace fs = std::filesystem;
 
 // One line for a missing package, instead of a traceback.
-constexpr const char* kStart = R"py(import sys
+constexpr const char* kStart = R"py(import importlib, sys
 try:
-    from ruedo.campaign.cli import main
+    main = importlib.import_module(sys.argv[1]).main
 except ImportError as error:
-    print(f"ruedo: {error}: this Python ({sys.executable}) needs pip install 'ruedo[campaign]' (for hunts 'ruedo[hunt]', for clusters 'ruedo[ray]')", file=sys.stderr)
+    print(f"ruedo: {error}: this Python ({sys.executable}) needs pip install {sys.argv[2]}", file=sys.stderr)
     sys.exit(4)
-sys.exit(main(sys.argv[1:]))
+sys.exit(main(sys.argv[3:]))
 )py";
 
 // The folder that holds the package: of an installation, of a build, or "" where Python has to know
@@ -46,7 +45,10 @@ std::string python() {
   return own.empty() ? "python3" : own;
 }
 
-int hand_over(const char* command, const std::vector<std::string>& arguments) {
+}  // namespace
+
+int hand_over_to_python(const std::string& module, const std::string& extras,
+                        const std::vector<std::string>& words) {
   const std::string package = package_folder(), interpreter = python();
   const char* before = std::getenv("PYTHONPATH");
   if (!package.empty())
@@ -55,38 +57,17 @@ int hand_over(const char* command, const std::vector<std::string>& arguments) {
   std::error_code error;
   if (const fs::path self = fs::read_symlink("/proc/self/exe", error); !error)
     ::setenv("RUEDO", self.c_str(), 0);
-  std::vector<std::string> words{interpreter, "-c", kStart, command};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<std::string> all{interpreter, "-c", kStart, module, extras};
+  all.insert(all.end(), words.begin(), words.end());
   std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
+  for (std::string& word : all) pointers.push_back(word.data());
   pointers.push_back(nullptr);
   ::execvp(interpreter.c_str(), pointers.data());
   throw EnvironmentError(
       fmt::format("ruedo {} needs Python 3.10 or newer: '{}' cannot be started ({}); install it "
                   "(apt-get install python3), "
                   "or name one in RUEDO_PYTHON",
-                  command, interpreter, std::strerror(errno)));
+                  words.front(), interpreter, std::strerror(errno)));
 }
 
-void add(CLI::App& app, Action& chosen, const char* name, const char* description) {
-  CLI::App* command = app.add_subcommand(name, description);
-  command->prefix_command();  // Python reads what follows
-  command->set_help_flag();
-  command->callback([command, name, &chosen] {
-    chosen = [command, name] { return hand_over(name, command->remaining()); };
-  });
-}
-
-void add_campaign(CLI::App& app, Action& chosen) {
-  add(app, chosen, "campaign",
-      "many runs: worlds, parameters, seeds and controllers of one file, judged and reported");
-  add(app, chosen, "hunt",
-      "search for the case that breaks a controller, and shrink it to a regression test");
-  add(app, chosen, "why",
-      "until when a failed run could have been saved, and which single change would have saved it");
-}
-
-const RegisterCommand kRegister{56, add_campaign};
-
-}  // namespace
 }  // namespace ruedo::cli

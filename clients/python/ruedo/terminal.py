@@ -1,4 +1,4 @@
-"""What the commands print; names and reasons may be a stranger's."""
+"""What the commands of this package print; names and reasons may be a stranger's."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..errors import for_terminal
+from .errors import for_terminal
 
 
 def say(text: str) -> None:

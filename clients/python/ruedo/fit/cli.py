@@ -1,0 +1,95 @@
+"""ruedo fit, and ruedo import of recorded drives. Exit codes: 0 good, 2 wrong usage, 3 bad file,
+4 environment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path as File
+
+from ..errors import NotSupported, RuedoError
+from ..terminal import drop, flush, say, tell
+from .errors import FitError, UsageError
+
+GOOD, USAGE, BAD_INPUT, ENVIRONMENT = 0, 2, 3, 4
+
+
+def main(words: list[str]) -> int:
+    try:
+        arguments = _parser().parse_args(words)
+        code = int(arguments.action(arguments))
+        flush()
+        return code
+    except FitError as error:
+        tell(f"ruedo: {error}")
+        return error.exit_code
+    except (ImportError, NotSupported) as error:
+        tell(f"ruedo: {error}; pip install 'ruedo[fit]'")
+        return ENVIRONMENT
+    except KeyboardInterrupt:
+        tell("ruedo: interrupted")
+        return ENVIRONMENT
+    except BrokenPipeError:
+        drop(1)
+        return GOOD
+    except RuedoError as error:
+        tell(f"ruedo: {error}")
+        return ENVIRONMENT
+    except OSError as error:
+        tell(f"ruedo: {f'{error.filename}: {error.strerror}' if error.filename else error}")
+        return BAD_INPUT if error.filename and not File(error.filename).exists() else ENVIRONMENT
+
+
+def _parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser(prog="ruedo")
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+    text = "fit a robot's errors to logs of the real one"
+    one = commands.add_parser("fit", help=text, description=text + " (docs/fit.md)")
+    one.set_defaults(action=_fit)
+    one.add_argument("LOG", nargs="+", help="drives of one robot, of any kind that Ruedo reads")
+    one.add_argument("--robot", metavar="ROBOT", help="its model: a file, or one of Ruedo's (p3at)")
+    one.add_argument(
+        "--of", metavar="NAME", default="", help="of an LCM log with several robots: which"
+    )
+    one.add_argument("-o", "--output", metavar="FILE", help="the fitted model, SDF")
+    one.add_argument("--report", metavar="FILE", help="an HTML page with plots")
+    one.add_argument("--json", action="store_true", help="print the values as JSON")
+    return top
+
+
+def _fit(arguments: argparse.Namespace) -> int:
+    from .fitting import fit, read_robot, save
+    from .read import read
+
+    if arguments.output and not arguments.robot:
+        raise UsageError("-o needs --robot: the model into which the values are written")
+    for option in ("output", "report"):
+        named = getattr(arguments, option)
+        if named and not File(named).absolute().parent.is_dir():
+            raise UsageError(f"{named}: its folder does not exist")
+    robot = read_robot(arguments.robot) if arguments.robot else None
+    recordings = [read(one, arguments.of) for one in arguments.LOG]
+    answer = fit(recordings, robot)
+    if arguments.output:
+        assert robot is not None
+        save(answer, robot, File(arguments.output))
+    if arguments.report:
+        from .report import write_report
+
+        write_report(answer, File(arguments.report))
+    for remark in answer.remarks:
+        tell(f"ruedo: {remark}")
+    if arguments.json:
+        say(json.dumps(answer.as_dict()))
+    else:
+        for part, estimates in answer.parts.items():
+            say(part)
+            for one in estimates:
+                say(f"  {one.text()}")
+    return GOOD
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,205 @@
+"""A fit as a whole: from logs and a robot to values, elements for its file, and a report."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from ..engine import Engine
+from ..launch import find_ruedo
+from .drives import Drive
+from .errors import FitError
+from .estimate import Estimate, normal
+from .odometry import OdometryFit, fit_odometry
+from .recording import Array, Geometry, Recording, body_steps
+from .robot_file import Setting, write_fitted
+
+
+@dataclass
+class Robot:
+    """A robot's model: its file, its nominal measures, its devices of ruedo info."""
+
+    name: str
+    file: File
+    geometry: Geometry
+    info: dict[str, Any]
+    devices: list[dict[str, Any]]
+
+
+def read_robot(name: str) -> Robot:
+    """By its file or the name of one of Ruedo's. Raises FitError."""
+    placed = [] if File(name).exists() else [f"{name}@0,0"]
+    world = "empty" if placed else name
+    options = ["--json", "--quiet", *(f"--spawn={one}" for one in placed)]
+    done = subprocess.run(
+        [find_ruedo(), "info", *options, "--", world], capture_output=True, text=True
+    )
+    if done.returncode:
+        raise FitError(done.stderr.strip().removeprefix("ruedo: ") or f"{name}: no robot")
+    info = json.loads(done.stdout)
+    driven = [one for one in info["robots"] if one["drive"]]
+    if len(driven) != 1:
+        raise FitError(f"{name}: {len(driven)} robots with a drive; a model of one is needed")
+    robot = driven[0]
+    kind = {"kinematic": "differential", "wheels": "differential"}.get(
+        robot["drive"], robot["drive"]
+    )
+    if kind.endswith("tracked"):
+        kind = "differential"
+    with Engine(world, spawn=placed, allow_errors=True) as engine:
+        file = _model_file([File(one) for one in engine.files_read], name)
+    geometry = Geometry(kind.split(" ")[-1], robot["wheel_radius"], robot["track"])
+    return Robot(robot["name"], file, geometry, robot, info["devices"])
+
+
+def _model_file(files: list[File], name: str) -> File:
+    """The robot's own file among those that were read."""
+    if File(name).is_file():
+        return File(name)
+    for one in files:
+        if one.parent.name == name or one.stem == name:
+            return one
+    raise FitError(f"{name}: its SDF file was not found; --robot also takes a file")
+
+
+@dataclass
+class Fit:
+    """Estimates by part ("Odometry"), elements for the robot's file, and remarks."""
+
+    recordings: list[Recording]
+    parts: dict[str, list[Estimate]] = field(default_factory=dict)
+    settings: list[Setting] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    odometry: OdometryFit | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For --json: {part: [{name, value, low, high, unit, why}]}."""
+        return {
+            "logs": [str(one.file) for one in self.recordings],
+            "remarks": self.remarks,
+            "parts": {
+                part: [
+                    {
+                        "name": one.name,
+                        "value": one.value,
+                        "low": _finite(one.low),
+                        "high": _finite(one.high),
+                        "unit": one.unit,
+                        "why": one.why,
+                    }
+                    for one in estimates
+                ]
+                for part, estimates in self.parts.items()
+            },
+            "settings": {one.path: one.value for one in self.settings},
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def fit(recordings: Sequence[Recording], robot: Robot | None = None) -> Fit:
+    """Everything that the logs determine. Raises FitError where that is nothing."""
+    answer = Fit(list(recordings))
+    for one in recordings:
+        answer.remarks += [f"{one.file}: {finding}" for finding in one.findings]
+    _fit_drive(answer, robot)
+    if not answer.parts:
+        raise FitError("; ".join(answer.remarks))
+    return answer
+
+
+def _fit_drive(answer: Fit, robot: Robot | None) -> None:
+    first = answer.recordings[0]
+    geometry = first.geometry or (robot.geometry if robot else None)
+    if geometry is None:
+        answer.remarks.append("odometry is not fitted: --robot gives the nominal radius and track")
+        return
+    if first.wheels is None and first.odometry is None:
+        answer.remarks.append(
+            f"odometry, slip and motion are not fitted: this {first.kind} has no raw odometry or encoders"
+        )
+        return
+    try:
+        found = fit_odometry(answer.recordings, geometry)
+    except FitError as error:
+        answer.remarks.append(f"odometry is not fitted: {error}")
+        return
+    answer.odometry = found
+    answer.parts["Odometry"] = found.estimates
+    if geometry.kind == "differential" and robot is not None:
+        _drive_settings(answer, found, robot)
+
+
+def believed_measures(recording: Recording, geometry: Geometry) -> Array:
+    """Radii and track that the robot's own odometry computes with: from its encoders and its
+    odometry where a log has both, else the nominal ones.
+    """
+    nominal = Drive(geometry).nominal()
+    if recording.wheels is None or recording.odometry is None:
+        return nominal
+    time = recording.wheels.time
+    steps = body_steps(recording.odometry.at(time))
+    turned = np.diff(recording.wheels.turned, axis=0)
+    if np.any(np.abs(turned).sum(axis=0) == 0):
+        return nominal
+    ahead, *_ = np.linalg.lstsq(turned / 2, steps[:, 0], rcond=None)
+    turn, *_ = np.linalg.lstsq(turned * [-ahead[0], ahead[1]], steps[:, 2:], rcond=None)
+    track = 1 / float(turn.mean()) if turn.mean() > 0 else nominal[2]
+    return np.array([*ahead, track])
+
+
+def _drive_settings(answer: Fit, found: OdometryFit, robot: Robot) -> None:
+    """The drive gets the true measures; its odometry the errors of those that the robot believes
+    in.
+    """
+    names = ", ".join(one.file.name for one in answer.recordings)
+    believed = believed_measures(answer.recordings[0], found.drive.geometry)
+    relative = np.sqrt(np.diag(found.covariance))[:3] / found.parameters
+    errors = believed / found.parameters - 1
+    estimates = []
+    for name, error, std, known in zip(
+        ("left radius error", "right radius error", "track error"),
+        errors,
+        relative,
+        found.determined,
+    ):
+        if known:
+            estimates.append(
+                normal(name, float(error), float(std), "", "believed over true, less 1")
+            )
+    answer.parts["Odometry"] = found.estimates + estimates
+    source = f"fitted to {names}, 95 %: "
+
+    def put(path: str, value: str, one: list[Estimate]) -> None:
+        text = "; ".join(f"{e.low:.5g} to {e.high:.5g}" for e in one)
+        answer.settings.append(Setting(path, value, source + text))
+
+    by_name = {one.name: one for one in answer.parts["Odometry"] if one.value is not None}
+    if found.determined[:2].all():
+        radius = float(found.parameters[:2].mean())
+        sides = [by_name["left radius"], by_name["right radius"]]
+        put("ruedo:drive/ruedo:wheel_radius", f"{radius:.6g}", sides)
+        sides = [by_name["left radius error"], by_name["right radius error"]]
+        put("ruedo:odometry/ruedo:radius_error", f"{errors[0]:.5g} {errors[1]:.5g}", sides)
+    if found.determined[2]:
+        put("ruedo:drive/ruedo:track", f"{found.parameters[2]:.6g}", [by_name["track"]])
+        put("ruedo:odometry/ruedo:track_error", f"{errors[2]:.5g}", [by_name["track error"]])
+    if "slip noise" in by_name:
+        put("ruedo:odometry/ruedo:slip_noise", f"{found.slip:.5g}", [by_name["slip noise"]])
+
+
+def save(answer: Fit, robot: Robot, out: File) -> None:
+    """The fitted robot as a file that runs."""
+    if out.resolve() == robot.file.resolve():
+        raise FitError(f"{out}: it is the robot's own file; the fitted one needs another name")
+    names = ", ".join(one.file.name for one in answer.recordings)
+    write_fitted(robot.file, answer.settings, out, f"{robot.name}, fitted by ruedo fit to {names}.")

@@ -1,0 +1,69 @@
+"""Opens a log of any kind that a fit reads; its content says which kind it is."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path as File
+
+from ..files import open_regular
+from ..logs import EVENT
+from .bags import read_bag
+from .carmen import LINES, read_carmen
+from .errors import FitError
+from .lcm_log import read_lcm
+from .recording import Recording
+from .tables import COLUMNS, read_csv, read_encoder_table
+
+KINDS = (
+    "CARMEN log, LCM log, ROS 1 or 2 bag (.bag, sqlite3, MCAP), encoder table with its metadata, "
+    "CSV with a header"
+)
+
+
+def read(path: str | File, robot: str = "") -> Recording:
+    """A recording from a file, or from the folder of a ROS 2 bag. robot: of an LCM log with
+    several.
+
+    Raises FitError for what is no log or is damaged, OSError for what cannot be opened.
+    """
+    file = File(path)
+    if file.is_dir():
+        if not (file / "metadata.yaml").exists():
+            raise FitError(f"{file}: a folder without metadata.yaml; that of a ROS 2 bag has one")
+        return read_bag(file)
+    head = _head(file)
+    if not head:
+        raise FitError(f"{file}: it is empty; allowed are {KINDS}")
+    if head.startswith(EVENT):
+        return read_lcm(file, robot)
+    if head.startswith((b"#ROSBAG", b"\x89MCAP", b"SQLite format 3")):
+        return read_bag(file)
+    first = head.decode("utf-8", "replace").split("\n")[0].strip()
+    if first.split(" ")[0] in LINES or first.startswith("#"):
+        return read_carmen(file)
+    cells = [cell.strip().lower() for cell in first.split(",")]
+    if len(cells) > 1 and _is_number(cells[0]):
+        return read_encoder_table(file)
+    if len(cells) > 1 and any(cell in COLUMNS for cell in cells):
+        return read_csv(file)
+    raise FitError(f"{file}: it begins with '{first[:40]}'; allowed are {KINDS}")
+
+
+def _head(file: File) -> bytes:
+    with open_regular(file) as raw:
+        head = raw.read(512)
+        if head[:2] != b"\x1f\x8b":
+            return head
+        raw.seek(0)
+        try:
+            return gzip.GzipFile(fileobj=raw).read(512)
+        except (EOFError, OSError) as error:
+            raise FitError(f"{file}: the compressed file is damaged: {error}") from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

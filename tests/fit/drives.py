@@ -1,0 +1,28 @@
+"""Logs of known truth, made by Ruedo itself: a robot drives a random course and is recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+from ruedo.engine import Engine
+
+LEGS = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (0.8, 0.7), (0.8, -0.7))
+
+
+def drive(
+    file, robot, settings, seed, *, world="empty", place="0,0", legs=48, speeds=(0.4, 0.6), name=""
+):
+    """Writes a log. settings: of devices, without the robot's name. speeds: m/s, rad/s. name: of
+    the robot, where `robot` is a file.
+    """
+    rng = np.random.default_rng(seed)
+    every = {f"{name or robot}/{key}": value for key, value in settings.items()}
+    with Engine(world, spawn=[f"{robot}@{place}"], seed=seed, set=every) as first:
+        off = [f"{a}/{b}" for a, b, kind in first.devices if kind in ("camera", "sonar")]
+    with Engine(world, spawn=[f"{robot}@{place}"], seed=seed, set=every, disable=off) as engine:
+        engine.begin_run(seed, log=str(file), everything=True)
+        quarter = round(0.25 / engine.dt)
+        for leg in range(legs):
+            command = np.array(LEGS[leg % len(LEGS)]) * speeds
+            for _ in range(int(rng.uniform(12, 32))):
+                engine.step(command, quarter)
+        engine.end_run()

@@ -1,0 +1,174 @@
+"""Readers of logs: each kind by its content, values by hand, and one clear error for bad ones."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+from conftest import ruedo
+from ruedo.fit import FitError, read
+
+METADATA = "type,diff,\nngear,10,\nencRes,36,\nLi,0.4,\nDi,0.2,0.2\nN,1,\n"
+
+
+def flaser(ranges, pose, time, host="lab"):
+    place = " ".join(map(str, pose))
+    readings = " ".join(map(str, ranges))
+    return f"FLASER {len(ranges)} {readings} {place} {place} {time} {host} {time}\n"
+
+
+def test_carmen(tmp_path):
+    log = tmp_path / "a.log.gz"
+    text = "# message formats\nPARAM robot_front_laser_max 50 lab 0\n"
+    text += flaser([1, 2, 81.9], (1, 2, 3.0), 10) + flaser([1, 2, 81.9], (2, 2, -3.2), 11)
+    log.write_bytes(gzip.compress(text.encode()))
+    one = read(log)
+    assert one.kind == "CARMEN log"
+    assert one.scans.ranges.tolist() == [[1, 2, 81.9], [1, 2, 81.9]]
+    assert one.scans.angles == pytest.approx([-np.pi / 2, 0, np.pi / 2])
+    assert one.scans.max_range < 81.9  # 81.9 m means no return
+    assert one.truth.time.tolist() == [10, 11]
+    assert one.truth.pose[1] == pytest.approx([2, 2, 2 * np.pi - 3.2])  # unwrapped
+
+
+def test_carmen_without_times(tmp_path):
+    log = tmp_path / "a.log"
+    log.write_text("".join(flaser([1, 2, 3], (x, 0, 0), 0) for x in range(4)))
+    one = read(log)
+    assert one.truth.time == pytest.approx([0, 2, 4, 6])  # 1 m at 0.5 m/s
+    assert "do not increase" in one.findings[0]
+
+
+def test_encoder_table(tmp_path):
+    (tmp_path / "7_metadata.csv").write_text(METADATA)
+    table = tmp_path / "7_run-01.csv"
+    table.write_text("0,0,0,0,0,0\n0.1,0,0,0,36,18\n0.2,0.1,0,0,36,18\n")
+    one = read(table)
+    # 360 ticks a turn; the table has the right wheel first
+    assert one.wheels.turned == pytest.approx(
+        np.array([[0, 0], [18, 36], [36, 72]]) * 2 * np.pi / 360
+    )
+    assert (one.geometry.kind, one.geometry.radius_m, one.geometry.track_m) == (
+        "differential", 0.1, 0.4,
+    )  # fmt: skip
+
+
+def test_csv_with_header(tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text(
+        "theta,time,x,y,left,right,battery\n0,1,2,3,0,0,12\n0.1,2,3,3,,,12\n0.2,3,4,3,2,3,12\n"
+    )
+    one = read(table)
+    assert one.truth.pose.tolist() == [[2, 3, 0], [3, 3, 0.1], [4, 3, 0.2]]
+    assert one.wheels.time.tolist() == [1, 3]  # the row with empty cells has no encoders
+    assert one.findings == ["columns that are not read: battery"]
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+def test_bags(tmp_path, kind):
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_JAZZY)
+    if kind == "ros1":  # its store lacks tf2
+        tf = "tf2_msgs/msg/TFMessage"
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", tf))
+    one = store.types
+    stamp = (lambda t: {"seq": 0}) if kind == "ros1" else (lambda t: {})
+
+    def header(t, frame):
+        time = one["builtin_interfaces/msg/Time"](int(t), 0)
+        return one["std_msgs/msg/Header"](**stamp(t), stamp=time, frame_id=frame)
+
+    quarter = one["geometry_msgs/msg/Quaternion"](0, 0, np.sqrt(0.5), np.sqrt(0.5))
+    straight = one["geometry_msgs/msg/Quaternion"](0, 0, 0, 1)
+    vector = one["geometry_msgs/msg/Vector3"]
+
+    def transforms(t):
+        transform = one["geometry_msgs/msg/Transform"]
+        stamped = one["geometry_msgs/msg/TransformStamped"]
+        return one["tf2_msgs/msg/TFMessage"](
+            [
+                stamped(header(t, "map"), "odom", transform(vector(10, 20, 0), quarter)),
+                stamped(header(t, "odom"), "base_link", transform(vector(t, 1, 0), straight)),
+            ]
+        )
+
+    def scan(t):
+        rays = np.array([1.0, np.inf, 3.0], np.float32)
+        return one["sensor_msgs/msg/LaserScan"](
+            header(t, "laser"), -1.0, 1.0, 1.0, 0, 0, 0.1, 8.0, rays, np.zeros(0, np.float32)
+        )
+
+    if kind == "ros1":
+        from rosbags.rosbag1 import Writer
+
+        path = tmp_path / "a.bag"
+        writer, write = Writer(path), store.serialize_ros1
+    else:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+
+        path = tmp_path / "bag"
+        plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+        writer, write = Writer(path, version=9, storage_plugin=plugin), store.serialize_cdr
+    with writer:
+        for topic, name, make in (
+            ("/tf", "tf2_msgs/msg/TFMessage", transforms),
+            ("/scan", "sensor_msgs/msg/LaserScan", scan),
+        ):
+            connection = writer.add_connection(topic, name, typestore=store)
+            for t in (1, 2):
+                writer.write(connection, t * 10**9, write(make(t), name))
+    found = read(path)
+    # map->odom turns by 90 degrees: (t, 1) in odom is (10 - 1, 20 + t) in map
+    assert found.truth.pose == pytest.approx(np.array([[9, 21, np.pi / 2], [9, 22, np.pi / 2]]))
+    assert found.odometry.pose == pytest.approx(np.array([[1, 1, 0], [2, 1, 0]]))
+    assert found.scans.ranges.tolist() == [[1, np.inf, 3]] * 2
+    assert found.scans.angles.tolist() == [-1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.log", "", "it is empty"),
+        ("a.log", "hello world\n", "it begins with 'hello world'; allowed are CARMEN log"),
+        ("a.log", "FLASER 3 1 2\n", "a.log:1: FLASER with 4 words and '3' rays"),
+        ("a.log", flaser([1, 2, 3], (0, 0, 0), 1).replace("2", "x", 1), "a.log:1: "),
+        ("a.log", "PARAM a 1 lab 0\n", "no FLASER or ROBOTLASER1 line"),
+        ("a.csv", "0,0,0,0,1,1\n1,0,0,0,1,1\n", "metadata"),
+        ("a.csv", "time,x,y\n0,1,2\n1,2,3\n", "a.csv:1: 'x' without 'theta'"),
+        ("a.csv", "time,left,right\n0,1,2\n1,2\n", "a.csv:3: 2 columns, the first row has 3"),
+        ("a.csv", "x,y,theta\n0,1,2\n", "no column 'time'"),
+        (
+            "7_run-01.csv",
+            "0,0,0,0,0,0\n0,0,0,0,36,18\n",
+            "7_run-01.csv:2: time 0 s does not increase",
+        ),
+        ("7_run-01.csv", "0,0,0,0,0,0\n1,nan,0,0,36,18\n", "7_run-01.csv:2: finite numbers"),
+    ],
+)
+def test_bad_files(tmp_path, name, text, said):
+    (tmp_path / "7_metadata.csv").write_text(METADATA)
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FitError) as error:
+        read(tmp_path / name)
+    assert said in str(error.value)
+    if text:
+        assert str(tmp_path / name) in str(error.value)
+
+
+def test_damaged_gzip(tmp_path):
+    log = tmp_path / "a.log.gz"
+    log.write_bytes(gzip.compress(flaser(range(1000), (0, 0, 0), 1).encode() * 10)[:-20])
+    with pytest.raises(FitError, match="damaged"):
+        read(log)
+
+
+def test_command_says_what_is_wrong(tmp_path):
+    (tmp_path / "a.log").write_text("hello\n")
+    _, said = ruedo("fit", tmp_path / "a.log", code=3)
+    assert said.startswith(f"ruedo: {tmp_path}/a.log: it begins with 'hello'")
+    _, said = ruedo("fit", tmp_path / "none.log", code=3)
+    assert said == f"ruedo: {tmp_path}/none.log: No such file or directory\n"
+    _, said = ruedo("fit", tmp_path / "a.log", "-o", tmp_path / "x.sdf", code=2)
+    assert "--robot" in said
