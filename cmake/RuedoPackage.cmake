@@ -14,13 +14,16 @@ install(DIRECTORY ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR})
 set(debian ${PROJECT_BINARY_DIR}/debian)
 file(GLOB of_debian ${PROJECT_SOURCE_DIR}/packaging/debian/*)
 add_custom_command(OUTPUT ${debian}/usr/share/doc/ruedo/changelog.gz
-  COMMAND ${RUEDO_PYTHON} ${PROJECT_SOURCE_DIR}/packaging/debian_tree.py ${debian}
+  COMMAND ${RUEDO_PYTHON} ${PROJECT_SOURCE_DIR}/packaging/debian_tree.py ${debian} "${RUEDO_MAINTAINER} <${RUEDO_EMAIL}>"
   DEPENDS ${PROJECT_SOURCE_DIR}/packaging/debian_tree.py ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${of_debian} VERBATIM)
 add_custom_target(debian_tree DEPENDS ${debian}/usr/share/doc/ruedo/changelog.gz)
 
 set(CPACK_PACKAGE_NAME ruedo)
-set(CPACK_PACKAGE_VENDOR "The Ruedo authors")
-set(CPACK_PACKAGE_CONTACT "The Ruedo authors <ruedo@localhost>")
+set(CPACK_PACKAGE_VENDOR "${RUEDO_MAINTAINER}")
+set(CPACK_PACKAGE_CONTACT "${RUEDO_MAINTAINER} <${RUEDO_EMAIL}>")
+if(RUEDO_HOMEPAGE)
+  set(CPACK_PACKAGE_HOMEPAGE_URL ${RUEDO_HOMEPAGE})
+endif()
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "simulation server for mobile robots")
 set(CPACK_PACKAGE_DESCRIPTION "Loads worlds and robots in SDF and URDF, steps them, and serves their
 sensors over LCM, with clients for C++, Python and Java. The same seed and

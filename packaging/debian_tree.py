@@ -1,5 +1,6 @@
-"""What Debian's package holds besides an installation: debian_tree.py FOLDER. The changelog is
-CHANGELOG.md's, its date that of SOURCE_DATE_EPOCH; Python finds the client by a .pth file.
+"""What Debian's package holds besides an installation: debian_tree.py FOLDER MAINTAINER.
+
+The changelog is CHANGELOG.md's, its date that of SOURCE_DATE_EPOCH; Python finds the client by a .pth file.
 """
 
 import gzip
@@ -12,10 +13,9 @@ from email.utils import formatdate
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-MAINTAINER = "The Ruedo authors <ruedo@localhost>"
 
 
-def changelog(text: str, date: str) -> str:
+def changelog(text: str, maintainer: str, date: str) -> str:
     """Debian's form of CHANGELOG.md's newest version."""
     version, items = re.search(
         r"^## (\S+?),? .*?\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL
@@ -26,12 +26,12 @@ def changelog(text: str, date: str) -> str:
         for change in changes
     ]
     body = "\n".join(lines)
-    return f"ruedo ({version}) unstable; urgency=medium\n\n{body}\n\n -- {MAINTAINER}  {date}\n"
+    return f"ruedo ({version}) unstable; urgency=medium\n\n{body}\n\n -- {maintainer}  {date}\n"
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, maintainer: str) -> None:
     date = formatdate(int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
-    text = changelog((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), date)
+    text = changelog((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), maintainer, date)
     shutil.rmtree(folder, ignore_errors=True)
     doc = folder / "usr/share/doc/ruedo"
     overrides = folder / "usr/share/lintian/overrides"
@@ -46,4 +46,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2])

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# try_in_debian.sh FOLDER WHEEL SUITE...: installs and tries Ruedo's wheel in a bare Debian of each suite (bookworm, trixie), made by
+# try_in_debian.sh FOLDER WHEELS SUITE...: installs and tries Ruedo's wheels, in the folder WHEELS, in a bare Debian of each suite (bookworm, trixie), made by
 # debootstrap in FOLDER/SUITE: as an ordinary user, without compiler, GPU or display, and without a network: what the wheel depends on is
 # fetched by pip before. packaging/try_wheel.sh says what is tried. Prints what happens; fails when something does not
 # work. Wants root.
@@ -7,18 +7,18 @@
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 mkdir -p "$1"
-folder=$(realpath "$1") wheel=$(realpath "$2")
+folder=$(realpath "$1") wheels=$(realpath "$2")
 shift 2
 
 # The wheels that the given Python (3.13) takes, into a folder.
 fetch_wheels() {
   local version=$1 to=$2 platforms=() glibc
   for glibc in {36..5}; do platforms+=(--platform "manylinux_2_${glibc}_x86_64"); done
-  local what=(pytest "ruedo[gym,logs,campaign,hunt] @ file://$wheel")
-  [[ ${RUEDO_TESTS-} != none ]] || what=("$wheel")
+  local what=(pytest "ruedo[camera,gym,logs,campaign,hunt]")
+  [[ ${RUEDO_TESTS-} != none ]] || what=("ruedo[camera]")
   mkdir -p "$to"
-  rm -f "$to"/ruedo-*
-  python3 -m pip download -q --dest "$to" --only-binary=:all: --python-version "$version" "${platforms[@]}" \
+  rm -f "$to"/ruedo[-_]*
+  python3 -m pip download -q --find-links "$wheels" --dest "$to" --only-binary=:all: --python-version "$version" "${platforms[@]}" \
     --platform manylinux2014_x86_64 --platform manylinux2010_x86_64 "${what[@]}"
 }
 

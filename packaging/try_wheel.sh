@@ -7,7 +7,7 @@ python=$1 wheels=$(realpath "$2") source=$(realpath "$3")
 
 rm -rf venv other
 "$python" -m venv venv
-venv/bin/pip install -q --no-index --find-links "$wheels" ruedo
+venv/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[camera]'
 venv/bin/ruedo --version
 test -d "$(venv/bin/ruedo --prefix)/lib/cmake/ruedo" -a -s "$(venv/bin/ruedo --jar)"
 venv/bin/ruedo check arena
@@ -27,7 +27,7 @@ except ruedo.LaunchError as error:
 PYTHON
 # Beside another environment: each starts the server of its own.
 "$python" -m venv other
-other/bin/pip install -q --no-index --find-links "$wheels" ruedo
+other/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[camera]'
 for one in venv other; do
   [[ $($one/bin/ruedo --prefix) == "$PWD/$one/"* ]]
   $one/bin/python -c "import importlib; found = importlib.import_module('ruedo.launch').find_ruedo(); assert found.startswith('$PWD/$one/'), found"

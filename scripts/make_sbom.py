@@ -1,4 +1,4 @@
-"""make_sbom.py BUILD OUT WHEEL FILE...: what the files of a release are and what is inside of
+"""make_sbom.py BUILD OUT FILE...: what the files of a release are and what is inside of
 them, as SPDX 2.3 in JSON: each package that something of it came from, with its version.
 """
 
@@ -20,11 +20,11 @@ import parts  # noqa: E402
 Part = tuple[str, str, str, str]  # name, version, licence, what registries call it
 
 
-def shared(wheel: Path) -> list[Part]:
-    """Of the wheel's shared libraries, which are named by the licences there."""
-    with zipfile.ZipFile(wheel) as archive:
-        folders = (Path(name) for name in archive.namelist() if ".dist-info/licenses/" in name)
-        names = sorted({path.name for path in folders if path.parent.name == "debian"})
+def shared(wheels: list[Path]) -> list[Part]:
+    """Of the wheels' shared libraries, which are named by the licences there."""
+    inside = [Path(name) for wheel in wheels for name in zipfile.ZipFile(wheel).namelist()]
+    licences = [path for path in inside if path.parent.parts[-2:] == ("licenses", "debian")]
+    names = sorted({path.name for path in licences})
     versions = [parts.installed()[name][1] for name in names]
     return [
         (name, version, parts.licence_of(name), f"pkg:deb/debian/{name}@{version}")
@@ -32,9 +32,9 @@ def shared(wheel: Path) -> list[Part]:
     ]
 
 
-def inside(build: Path, wheel: Path) -> list[Part]:
+def inside(build: Path, wheels: list[Path]) -> list[Part]:
     """Shared libraries; what is compiled in; of what Python and npm gave."""
-    found = shared(wheel)
+    found = shared(wheels)
     for source, (_, _, licence) in parts.COMPILED.items():
         if names := parts.packages_of(source):
             version = parts.installed()[names[0]][1]
@@ -93,17 +93,18 @@ def package_inside(name: str, version: str, licence: str, locator: str) -> dict[
     }
 
 
-def main(build: Path, out: Path, wheel: Path, files: list[Path]) -> None:
+def main(build: Path, out: Path, files: list[Path]) -> None:
     version = (ROOT / "VERSION").read_text(encoding="utf-8").strip()
+    wheels = [file for file in files if file.suffix == ".whl"]
     made = [package_of_file(file, version) for file in files]
-    found = [package_inside(*one) for one in inside(build, wheel)]
+    found = [package_inside(*one) for one in inside(build, wheels)]
 
     def related(one: str, kind: str, other: str) -> dict[str, str]:
         return {"spdxElementId": one, "relationshipType": kind, "relatedSpdxElement": other}
 
     relationships = [related("SPDXRef-DOCUMENT", "DESCRIBES", str(one["SPDXID"])) for one in made]
     relationships += [
-        related(identifier(wheel.name), "CONTAINS", str(one["SPDXID"])) for one in found
+        related(identifier(files[0].name), "CONTAINS", str(one["SPDXID"])) for one in found
     ]
     digest = hashlib.sha256("".join(str(one["checksums"]) for one in made).encode()).hexdigest()
     created = time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
@@ -124,5 +125,5 @@ def main(build: Path, out: Path, wheel: Path, files: list[Path]) -> None:
 
 
 if __name__ == "__main__":
-    build, out, wheel, *files = (Path(word) for word in sys.argv[1:])
-    main(build, out, wheel, [wheel, *files])
+    build, out, *files = (Path(word) for word in sys.argv[1:])
+    main(build, out, files)

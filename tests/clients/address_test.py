@@ -22,6 +22,7 @@ WRONG = {
     "udpm://239.255.76.67:0": "'0' is no port",
     "udpm://239.255.76.67:7667/": "'7667/' is no port",
     "tcpq://127.0.0.1:65536": "'65536' is no port",
+    "tcpq://[::1]:7700": "LCM has no IPv6: '[::1]:7700' is not allowed; give a name or an IPv4",
     "tcpq://no.such.host.invalid:7700": "'no.such.host.invalid' is no host that this machine knows",
     "tcpq://127.0.0.1:7700?ttl=1": "tcpq has no options",
     "udpm://239.255.76.67:7667?ttl=256": f"the option 'ttl=256' is not allowed: {OPTIONS}",

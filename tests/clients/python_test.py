@@ -26,9 +26,11 @@ import pytest
 import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import lcmtypes, samples
+from ruedo.address import read_address
 from ruedo.control import Session
 from ruedo.decoding import decode
 from ruedo.launch import _options
+from ruedo.multicast_transport import MulticastTransport
 
 QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
 
@@ -43,6 +45,22 @@ def scan(*ranges, utime=1):
         0.25,
     )
     return samples.CONVERSIONS["planar_lidar_t"][1](message)
+
+
+def test_what_is_sent_by_multicast_reaches_lcm():
+    """Of any size, around the largest datagram, of which "A/1" and its 0 take four bytes."""
+    url = f"{free_url()}&recv_buf_size=8388608"
+    heard, bus = [], lcm.LCM(url)
+    bus.subscribe(".*", lambda channel, data: heard.append((channel, data)))
+    transport = MulticastTransport(read_address(url))
+    for size in (0, 1, 63_995, 63_996, 63_997, 127_996, 127_997, 640 * 480 * 3):
+        data = bytes(i * 31 >> 3 & 255 for i in range(size))
+        transport.publish("A/1", data)
+        while not heard:
+            assert bus.handle_timeout(int(1000 * PATIENCE)) > 0
+        assert heard.pop() == ("A/1", data)
+    transport.close()
+    transport.publish("A/1", b"")  # after its end it is lost
 
 
 def test_samples_are_values():
@@ -1084,3 +1102,19 @@ def test_a_send_that_takes_long_holds_up_nobody_who_receives():
     session = Session(connection, "sender")
     assert session.request(lcmtypes.request_t.GET_STATE).session == 3
     assert ends == [True, True]  # JOIN, GET_STATE
+
+
+def test_message_types_need_no_numpy():
+    """A plain LCM program on a computer without it."""
+    program = (
+        "import importlib.util as u\nfind = u.find_spec\n"
+        "u.find_spec = lambda name, *rest: None if name == 'numpy' else find(name, *rest)\n"
+        "import sys\nsys.modules['numpy'] = None\n"
+        "from ruedo.lcmtypes import pose_t\nprint(len(pose_t().encode()))\nimport ruedo\n"
+        "try: ruedo.connect\nexcept ImportError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.splitlines() == [
+        str(len(lcmtypes.pose_t().encode())),
+        "ruedo.connect needs NumPy, without which there is ruedo.lcmtypes alone",
+    ], done.stderr

@@ -29,6 +29,8 @@ def artifact(tmp_path_factory):
     shutil.copytree(BUILD / "java", folder)
     words = {"SOURCES": SOURCE / "clients/java", "OUTPUT": folder, "VERSION": VERSION}
     words |= {"LICENSE": SOURCE / "LICENSE", "JAVADOC": "javadoc", "JAR": "jar"}
+    words |= {"GROUP": "ruedo", "HOMEPAGE": "https://example.org", "MAINTAINER": "A. Nyone"}
+    words |= {"REPOSITORY": "https://example.org/ruedo.git"}
     run(
         *("cmake", *(f"-D{name}={value}" for name, value in words.items())),
         *("-P", SOURCE / "clients/java/MavenArtifact.cmake"),
@@ -52,6 +54,10 @@ def test_the_artifact_is_whole(artifact):
     space = {"m": "http://maven.apache.org/POM/4.0.0"}
     assert pom.find("m:version", space).text == VERSION
     assert pom.find("m:dependencies", space) is None
+    said = {name: pom.findtext(f"m:{name}", namespaces=space) for name in ("groupId", "url")}
+    assert said == {"groupId": "ruedo", "url": "https://example.org"}
+    assert pom.findtext("m:scm/m:url", namespaces=space) == "https://example.org/ruedo.git"
+    assert pom.findtext("m:developers/m:developer/m:name", namespaces=space) == "A. Nyone"
 
 
 def test_the_compiler_has_nothing_to_say(artifact, tmp_path):

@@ -1,9 +1,10 @@
-"""The wheel with everything inside, installed into a virtual environment of its own and used from
+"""The wheels, installed into a virtual environment of its own and used from
 anywhere: program, server, engine, picture, what C++ and Java need. In bare Debians it is tried by
 packaging/try_in_debian.sh."""
 
 import os
 import re
+import subprocess
 import sys
 import sysconfig
 import zipfile
@@ -14,6 +15,7 @@ from processes import run as run_somewhere
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
+RUN_OF_A_SECOND = ["--rate", "max", "--duration", "1", "--quiet", "--lcm", "memq://"]
 
 
 def run(*command):
@@ -21,49 +23,77 @@ def run(*command):
     return run_somewhere(*command, cwd="/")
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("dist")
-    run(sys.executable, SOURCE / "scripts/make_wheel.py", BUILD, folder, 1)
-    return next(folder.glob("*.whl"))
+WHEELS = {  # of the test package.make_wheel
+    name: next((BUILD / "wheels").glob(f"{name}-*.whl"))
+    for name in ("ruedo", "ruedo_client", "ruedo_camera")
+}
 
 
-@pytest.fixture(scope="module")
-def venv(wheel, tmp_path_factory):
-    """With this environment's numpy and lcm, so that nothing is fetched."""
-    folder = tmp_path_factory.mktemp("wheel") / "venv"
+def make_venv(folder, *wheels):
+    """With this environment's numpy and what else they depend on, so that nothing is fetched."""
     run(sys.executable, "-m", "venv", "--without-pip", folder)
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        folder / "bin/python",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        wheel,
-    )
-    packages = Path(
-        run(
-            folder / "bin/python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"
-        ).strip()
-    )
+    words = ["--quiet", "--no-deps", "--no-index"]
+    run(sys.executable, "-m", "pip", "--python", folder / "bin/python", "install", *words, *wheels)
+    program = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    packages = Path(run(folder / "bin/python", "-c", program).strip())
     (packages / "others.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return folder
 
 
-def test_the_wheel_is_for_debian_12_and_holds_licences(wheel):
-    assert wheel.name.endswith("-py3-none-manylinux_2_36_x86_64.whl")
-    with zipfile.ZipFile(wheel) as archive:
-        names = archive.namelist()
-    assert any(name.endswith(".dist-info/LICENSE") for name in names)
-    assert any(name.endswith(".dist-info/licenses/copyright") for name in names)
-    assert any(name.endswith(".dist-info/licenses/debian/libosmesa6") for name in names)
-    assert not [
-        name for name in names if "glibc" in name or "/libc.so" in name or "/libm.so" in name
-    ]
+@pytest.fixture(scope="module")
+def venv(tmp_path_factory):
+    return make_venv(tmp_path_factory.mktemp("wheel") / "venv", *WHEELS.values())
+
+
+def test_the_wheels_are_for_debian_12_and_hold_licences():
+    assert WHEELS["ruedo"].name.endswith("-py3-none-manylinux_2_36_x86_64.whl")
+    assert WHEELS["ruedo_client"].name.endswith("-py3-none-any.whl")
+    names = {name: zipfile.ZipFile(wheel).namelist() for name, wheel in WHEELS.items()}
+    for of in names.values():
+        assert any(name.endswith(".dist-info/LICENSE") for name in of)
+        assert not [n for n in of if "glibc" in n or "/libc.so" in n or "/libm.so" in n]
+    assert any(name.endswith(".dist-info/licenses/copyright") for name in names["ruedo"])
+    licence = ".dist-info/licenses/debian/libosmesa6"
+    assert any(name.endswith(licence) for name in names["ruedo_camera"])
+    everything = [name for of in names.values() for name in of]
+    assert len(set(everything)) == len(everything)  # pip would remove another's file
+
+
+def test_the_client_alone_is_small_and_drives(venv, tmp_path):
+    """On a computer without the server, LCM and GLib: a run elsewhere, over TCP."""
+    assert WHEELS["ruedo_client"].stat().st_size < 2e6
+    client = make_venv(tmp_path / "venv", WHEELS["ruedo_client"])
+    program = """
+import sys
+sys.modules["lcm"] = None
+import ruedo
+try: ruedo.launch("arena", program="/nowhere")
+except (ruedo.LaunchError, TypeError) as error: print(error)
+try: ruedo.Engine
+except ImportError as error: print(error)
+with ruedo.connect(sys.argv[1], timeout=30) as sim:
+    sim.robot("p3at").advance(0.3).wait()
+    print("at %.2f" % sim.robot("p3at").pose.latest().x)
+"""
+    words = [venv / "bin/ruedo", "run", "arena", "--disable", "p3at/camera", "--rate", "20"]
+    url = f"unix://{tmp_path}/bus"
+    server = subprocess.Popen(
+        [*words, "--lcm", url, "--quiet"], stdout=subprocess.DEVNULL, cwd="/"
+    )
+    try:
+        said = run(client / "bin/python", "-c", program, url)
+    finally:
+        server.terminate()
+        server.wait()
+    assert "at 0.30" in said and "it comes with Ruedo's wheel" in said
+
+
+def test_without_the_renderer_the_error_names_it(tmp_path):
+    venv = make_venv(tmp_path / "venv", WHEELS["ruedo"], WHEELS["ruedo_client"])
+    render = f"RUEDO_RENDERER=osmesa {venv}/bin/ruedo render arena -o {tmp_path}/a.png 2>&1"
+    said = run("sh", "-c", f"{render}; test $? = 4")
+    assert "no renderer for cameras" in said and "pip install 'ruedo[camera]'" in said
+    run(venv / "bin/ruedo", "run", "arena", "--disable", "p3at/camera", *RUN_OF_A_SECOND)
 
 
 def test_nothing_is_loaded_from_outside(venv):

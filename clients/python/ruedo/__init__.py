@@ -13,6 +13,9 @@ Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the me
 themselves.
 """
 
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
 from ._installation import load_glib
 
 load_glib()  # before anything imports lcm
@@ -25,67 +28,72 @@ except ImportError as _error:
         "ruedo's message types were not generated: install the package (pip install clients/python) or "
         "build the target python_types and use BUILD/python"
     ) from _error
-from . import markers
-from .callbacks import Subscription
-from .errors import (
-    LaunchError,
-    LeaseLost,
-    MotionError,
-    NoServer,
-    NotSupported,
-    RequestError,
-    RuedoError,
-    RunEnded,
-    Timeout,
-    TypeMismatch,
-    UnknownName,
-)
-from .launch import find_ruedo, launch
-from .lockstep import Command, Message, Observations
-from .logs import read_log
-from .maps import OccupancyMap, load_map
-from .motion import Motion
-from .robot import Camera, Device, Robot
-from .samples import (
-    AirPressure,
-    AirSpeed,
-    Altimeter,
-    Box2D,
-    Box3D,
-    Boxes2D,
-    Boxes3D,
-    CameraInfo,
-    Collisions,
-    Contact,
-    ContactPoint,
-    ForceTorque,
-    Image,
-    Imu,
-    Joints,
-    LidarScan,
-    LogicalCamera,
-    LogicalObject,
-    Magnetometer,
-    MotionStatus,
-    NavSat,
-    Odometry,
-    OdometryTwist,
-    Pose,
-    Scan,
-    SonarReading,
-    State,
-)
-from .simulation import Simulation, connect
-from .stream import Reader, Stream
-from .values import Sample
-from .world import World
-from .world_info import Body
+
+_HAS_NUMPY = find_spec("numpy") is not None  # programs of plain LCM need the message types alone
+if TYPE_CHECKING or _HAS_NUMPY:
+    from . import markers
+    from .callbacks import Subscription
+    from .errors import (
+        LaunchError,
+        LeaseLost,
+        MotionError,
+        NoServer,
+        NotSupported,
+        RequestError,
+        RuedoError,
+        RunEnded,
+        Timeout,
+        TypeMismatch,
+        UnknownName,
+    )
+    from .launch import find_ruedo, launch
+    from .lockstep import Command, Message, Observations
+    from .logs import read_log
+    from .maps import OccupancyMap, load_map
+    from .motion import Motion
+    from .robot import Camera, Device, Robot
+    from .samples import (
+        AirPressure,
+        AirSpeed,
+        Altimeter,
+        Box2D,
+        Box3D,
+        Boxes2D,
+        Boxes3D,
+        CameraInfo,
+        Collisions,
+        Contact,
+        ContactPoint,
+        ForceTorque,
+        Image,
+        Imu,
+        Joints,
+        LidarScan,
+        LogicalCamera,
+        LogicalObject,
+        Magnetometer,
+        MotionStatus,
+        NavSat,
+        Odometry,
+        OdometryTwist,
+        Pose,
+        Scan,
+        SonarReading,
+        State,
+    )
+    from .simulation import Simulation, connect
+    from .stream import Reader, Stream
+    from .values import Sample
+    from .world import World
+    from .world_info import Body
 
 
 def __getattr__(name: str) -> object:
     """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
     it is first asked for.
     """
+    if not _HAS_NUMPY and name in __all__:
+        raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")
     if name not in ("Engine", "SavedWorld"):
         raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
     try:

@@ -55,6 +55,10 @@ def _address(url: str) -> Address:
     place, _, options = rest.partition("?")
     if options and scheme != "udpm":
         raise ValueError(f"{scheme} has no options")
+    if place.startswith("["):
+        raise ValueError(
+            f"LCM has no IPv6: '{place}' is not allowed; give a name or an IPv4 address"
+        )
     host, colon, digits = place.partition(":")
     default_host, default_port = _DEFAULTS[scheme]
     port = _number(digits, 1, 65535) if colon else default_port

@@ -1,6 +1,5 @@
-"""LCM's multicast as a transport. LCM itself only sends: its receiver reads outside of a datagram
-that is shorter than its head says and ends the program, and it keeps every channel's name that ever
-came.
+"""LCM's multicast as a transport, without LCM: its receiver reads outside of a datagram that is
+shorter than its head says and ends the program, and it keeps every channel's name that ever came.
 
     short:    "LC02", sequence, channel and a 0, data
     fragment: "LC03", sequence, size of the message, offset, number, of how many; number 0 has the
@@ -14,26 +13,20 @@ import math
 import select
 import socket
 import struct
+import threading
 import time
 from dataclasses import dataclass, field
-
-import lcm
 
 from . import arrivals
 from .address import Address
 from .errors import NoServer
 from .stream_transport import Receiver, is_readable
 
-if not hasattr(lcm, "EventLog"):
-    raise ImportError(
-        f"the module lcm, {lcm.__file__}, is not LCM's: install lcm (pip), and keep modules of that "
-        "name out of PYTHONPATH and of the script's folder"
-    )
-
 _SHORT, _FRAGMENT = b"LC02", b"LC03"
 _SHORT_HEAD = 8
 _HEAD = struct.Struct(">4sIIIHH")
 _LONGEST_CHANNEL, _LONGEST_DATAGRAM = 63, 65536
+_MOST_IN_DATAGRAM = 64000  # bytes of channel and data that are sent in one
 _LONGEST_MESSAGE = 64 << 20  # bytes
 _MOST_PARTIAL = 80 << 20  # bytes: memory of messages that are not whole yet
 _FRAGMENT_MEMORY = 256  # bytes, beside its data
@@ -41,7 +34,7 @@ _MOST_MESSAGES, _MOST_OF_SENDER = 64, 4  # of these
 _RECEIVE_BUFFER = 2 << 20  # bytes; the system gives at most its own limit
 _MOST_AT_ONCE = 100  # datagrams
 
-_Sender = tuple[str, int]
+_Address = tuple[str, int]
 
 
 @dataclass
@@ -67,6 +60,41 @@ class _Partial:
         return b"".join(pieces) if at == self.size else None
 
 
+class _Sender:
+    """From any thread. What the system does not take is lost, as LCM's own messages are."""
+
+    def __init__(self, address: Address):
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        # LCM's own receiver puts together one message of a sender at a time.
+        self._lock = threading.Lock()
+        self._sequence = 0
+        try:
+            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, address.ttl)
+            self._socket.connect((address.host, address.port))
+        except OSError:
+            self._socket.close()
+            raise
+
+    def send(self, channel: str, data: bytes) -> None:
+        name = channel.encode() + b"\0"
+        with self._lock, contextlib.suppress(OSError):  # of a network that is down, or closed
+            sequence = self._sequence & 0xFFFFFFFF
+            self._sequence += 1
+            if len(name) + len(data) <= _MOST_IN_DATAGRAM:
+                self._socket.send(_SHORT + sequence.to_bytes(4, "big") + name + data)
+                return
+            whole = name + data
+            count = -(-len(whole) // _MOST_IN_DATAGRAM)
+            for number in range(count):
+                piece = whole[number * _MOST_IN_DATAGRAM : (number + 1) * _MOST_IN_DATAGRAM]
+                offset = max(0, number * _MOST_IN_DATAGRAM - len(name))
+                head = _HEAD.pack(_FRAGMENT, sequence, len(data), offset, number, count)
+                self._socket.send(head + piece)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
 class MulticastTransport:
     """What waits is in the socket's buffer alone, for all channels together."""
 
@@ -76,20 +104,20 @@ class MulticastTransport:
 
     def __init__(self, address: Address):
         try:
-            # Sends, from any thread; None: closed.
-            self._lcm: lcm.LCM | None = lcm.LCM(str(address))
+            self._sender = _Sender(address)
             self._socket = _joined_socket(address)
-        except (OSError, RuntimeError) as error:
+        except OSError as error:
             raise NoServer(
                 f"{address}: it cannot be used ({error}); `ruedo doctor` looks for what is wrong"
             ) from None
+        self._closed = False
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
         self._buffer = bytearray(_LONGEST_DATAGRAM)
         self._view = memoryview(self._buffer)
         self._channels: dict[bytes, str] = {}  # that are listened to
         # Of a sender, and with its number; the newest last.
-        self._partials: dict[tuple[_Sender, int], _Partial] = {}
+        self._partials: dict[tuple[_Address, int], _Partial] = {}
         self._partial_memory = 0
 
     def subscribe(self, channel: str) -> None:
@@ -99,14 +127,13 @@ class MulticastTransport:
         self._channels.pop(channel.encode(), None)
 
     def publish(self, channel: str, data: bytes) -> None:
-        if open_lcm := self._lcm:
-            open_lcm.publish(channel, data)
+        self._sender.send(channel, data)
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         arrived: arrivals.Arrived = []
         deadline = time.monotonic() + seconds
         # What nobody listens to, such as what was sent here, is no end of the waiting.
-        while not arrived and self._lcm:
+        while not arrived and not self._closed:
             left = max(0.0, deadline - time.monotonic())
             if not self._poll.poll(math.ceil(left * 1e3)):
                 break
@@ -127,10 +154,11 @@ class MulticastTransport:
         return is_readable(self._socket)
 
     def close(self) -> None:
-        self._lcm = None
+        self._closed = True
+        self._sender.close()
         self._socket.close()
 
-    def _take(self, size: int, sender: _Sender, arrived: arrivals.Arrived) -> None:
+    def _take(self, size: int, sender: _Address, arrived: arrivals.Arrived) -> None:
         """A datagram, which is at the beginning of the buffer."""
         if size >= _HEAD.size and self._buffer.startswith(_FRAGMENT):
             self._take_fragment(size, sender, arrived)
@@ -141,7 +169,7 @@ class MulticastTransport:
                 arrived.append((channel, bytes(self._view[end + 1 : size])))
 
     def _take_fragment(
-        self, datagram_size: int, sender: _Sender, arrived: arrivals.Arrived
+        self, datagram_size: int, sender: _Address, arrived: arrivals.Arrived
     ) -> None:
         _, sequence, size, offset, number, count = _HEAD.unpack_from(self._buffer)
         name, data = b"", bytes(self._view[_HEAD.size : datagram_size])
@@ -175,7 +203,7 @@ class MulticastTransport:
         while self._partial_memory > _MOST_PARTIAL:
             self._drop_partial(next(iter(self._partials)))
 
-    def _drop_partial(self, key: tuple[_Sender, int]) -> None:
+    def _drop_partial(self, key: tuple[_Address, int]) -> None:
         partial = self._partials.pop(key, None)
         if partial is not None:
             self._partial_memory -= partial.memory

@@ -58,6 +58,11 @@ final class Address {
         String[] parts = rest.split("\\?", 2);
         Map<String, Integer> options = options(parts.length > 1 ? parts[1] : "");
         if (!multicast && !options.isEmpty()) throw refused("tcpq has no options");
+        if (parts[0].startsWith("["))
+            throw refused(
+                    "LCM has no IPv6: '"
+                            + parts[0]
+                            + "' is not allowed; give a name or an IPv4 address");
         String[] place = parts[0].split(":", 2);
         port = place.length > 1 ? port(place[1]) : multicast ? 7667 : 7700;
         host =
