@@ -489,8 +489,8 @@ void write_boxes_3d(const boxes_3d_t& seen, const Source& from, CdrWriter& out) 
   }
 }
 
-// Whose topic it is: a device's, each transducer's, the robot's, or a common one.
-enum class Scope { device, element, robot, world };
+// Whose topic it is: a device's, each transducer's, the robot's, or that of each tree of tf.
+enum class Scope { device, element, robot, tf };
 
 template <class Message>
 struct Row {
@@ -535,14 +535,14 @@ RUEDO_ROWS(odometry_t,
            {"odom", "nav_msgs/msg/Odometry", kStateQos, write_odometry, nullptr, nullptr,
             Scope::robot},
            {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_odometry_frame, nullptr, nullptr,
-            Scope::world},
+            Scope::tf},
            {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_wheels, has_wheels,
             nullptr, Scope::robot})
 RUEDO_ROWS(joint_state_t,
            {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints, nullptr, nullptr,
             Scope::robot},
            {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_joint_frames, moves_links, nullptr,
-            Scope::world})
+            Scope::tf})
 RUEDO_ROWS(imu_t, {"imu", "sensor_msgs/msg/Imu", kSensorQos, write_imu})
 RUEDO_ROWS(navsat_t, {"fix", "sensor_msgs/msg/NavSatFix", kSensorQos, write_fix},
            {"fix_velocity", "geometry_msgs/msg/TwistStamped", kSensorQos, write_fix_velocity})
@@ -604,8 +604,8 @@ struct Conversions::Plan {
   std::map<std::string, RobotFrames> links;
   std::map<std::string, std::shared_ptr<odometry_twist_t>> twists = {};  // by robot
 
-  std::vector<MovedLink> moved(const std::string& robot,
-                               const std::vector<RobotFrames::Moved>& all) const {
+  std::vector<MovedLink> moved(const std::string& robot, const std::vector<RobotFrames::Moved>& all,
+                               const std::string& prefix) const {
     const std::vector<LinkFrame>& frames = links.at(robot).frames;
     std::vector<MovedLink> moved;
     for (const RobotFrames::Moved& each : all) {
@@ -613,13 +613,18 @@ struct Conversions::Plan {
       link.sign = each.sign;
       if (each.frame == 0) continue;
       link.frame = frames[each.frame];
-      link.parent = names.frame(robot, frames[link.frame->parent].name);
-      link.child = names.frame(robot, link.frame->name);
+      link.parent = prefix + frames[link.frame->parent].name;
+      link.child = prefix + link.frame->name;
     }
     return moved;
   }
 
   Source source(const channel_info_t& channel) const {
+    return source(channel, names.frame(channel.robot, ""));
+  }
+
+  // prefix: of the robot's frames.
+  Source source(const channel_info_t& channel, const std::string& prefix) const {
     Source from;
     from.robot = channel.robot;
     const std::string name = channel.robot + "/" + channel.device;
@@ -633,15 +638,15 @@ struct Conversions::Plan {
     if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
     if (const auto robot = links.find(channel.robot); robot != links.end()) {
       from.still = robot->second.still;
-      from.turned = moved(channel.robot, robot->second.wheels);
-      from.moved = moved(channel.robot, robot->second.joints);
+      from.turned = moved(channel.robot, robot->second.wheels, prefix);
+      from.moved = moved(channel.robot, robot->second.joints, prefix);
     }
     from.rate = channel.rate;
     from.distro = options.distro;
     from.world = "world";
-    from.base = names.frame(channel.robot, "base_link");
-    from.odom = names.frame(channel.robot, "odom");
-    from.frame = names.frame(channel.robot, ros_name(channel.device));
+    from.base = prefix + "base_link";
+    from.odom = prefix + "odom";
+    from.frame = prefix + ros_name(channel.device);
     from.optical = from.frame + "_optical";
     return from;
   }
@@ -663,10 +668,8 @@ struct Conversions::Plan {
   // "scan" if the robot has one; otherwise "DEVICE/scan".
   template <class Message>
   std::string topic(const Row<Message>& row, const channel_info_t& channel) {
-    const bool alone = row.scope == Scope::robot || row.scope == Scope::world ||
-                       uses[{channel.robot, row.topic}] == 1;
-    return names.topic(row.scope == Scope::world ? "" : channel.robot,
-                       (alone ? "" : ros_name(channel.device) + "/") + row.topic);
+    const bool alone = row.scope == Scope::robot || uses[{channel.robot, row.topic}] == 1;
+    return names.topic(channel.robot, (alone ? "" : ros_name(channel.device) + "/") + row.topic);
   }
 };
 
@@ -772,12 +775,18 @@ Conversions::Conversions(const std::vector<world_info_t>& info, const Conversion
   });
   for (const auto& [name, device] : plan.devices) add_frames(*device, plan);
   for (const auto& [name, robot] : plan.links) add_links(name, robot, names);
-  CdrWriter out;
-  out.put_length(frames_.size());
-  for (const Frame& frame : frames_)
-    put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
-  standing_.push_back(
-      {{names.topic("", "tf_static"), "tf2_msgs/msg/TFMessage", kLatchedQos}, out.bytes()});
+  for (const std::string& robot : robots) {
+    add_alias(robot, "odom", names);
+    add_alias(robot, "base_link", names);
+  }
+  frames_[names.topic("", "tf_static")];  // also where nothing is on it
+  for (const auto& [topic, frames] : frames_) {
+    CdrWriter out;
+    out.put_length(frames.size());
+    for (const Frame& frame : frames)
+      put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
+    standing_.push_back({{topic, "tf2_msgs/msg/TFMessage", kLatchedQos}, out.bytes()});
+  }
 }
 
 Conversions::~Conversions() = default;
@@ -793,6 +802,11 @@ void Conversions::add_route(const channel_info_t& channel, Plan& plan) {
   for (const Row<Message>& row : rows<Message>()) {
     Source from = plan.source(channel);
     if (row.applies && !row.applies(from)) continue;
+    if (row.scope == Scope::tf) {
+      for (const Names::TfTree& tree : plan.names.tf_trees(channel.robot))
+        add(row, plan.source(channel, tree.prefix), plan.names.topic(tree.robot, row.topic));
+      continue;
+    }
     const std::string name = plan.topic(row, channel);
     if (row.scope != Scope::element) {
       add(row, from, name);
@@ -814,10 +828,24 @@ size_t Conversions::add_topic(Topic topic) {
   return at->second;
 }
 
-void Conversions::add_frame(const std::string& parent, const std::string& child, const Pose& X) {
+void Conversions::add_frame(const std::string& robot, const std::string& parent,
+                            const std::string& child, const Pose& X, Names& names) {
   const Quat& q = X.rotation;
-  Frame& added = frames_.emplace_back(Frame{parent, child, {}, {q.w(), q.x(), q.y(), q.z()}});
-  std::copy(X.translation.data(), X.translation.data() + 3, added.position);
+  for (const Names::TfTree& tree : names.tf_trees(robot)) {
+    Frame frame{tree.prefix + parent, tree.prefix + child, {}, {q.w(), q.x(), q.y(), q.z()}};
+    std::copy(X.translation.data(), X.translation.data() + 3, frame.position);
+    frames_[names.topic(tree.robot, "tf_static")].push_back(std::move(frame));
+  }
+}
+
+// Ties the frame of messages to that of the trees that have it under another name.
+void Conversions::add_alias(const std::string& robot, const std::string& name, Names& names) {
+  const std::string in_messages = names.frame(robot, name);
+  for (const Names::TfTree& tree : names.tf_trees(robot)) {
+    if (const std::string own = tree.prefix + name; own != in_messages)
+      frames_[names.topic(tree.robot, "tf_static")].push_back(
+          {own, in_messages, {0, 0, 0}, {1, 0, 0, 0}});
+  }
 }
 
 void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
@@ -826,8 +854,11 @@ void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
   if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" ||
       device.kind == "collisions" || device.kind == "joints")
     return;
-  const Names& names = plan.names;
-  const std::string frame = names.frame(device.robot, ros_name(device.name));
+  const std::string frame = ros_name(device.name);
+  const auto add = [&](const std::string& parent, const std::string& child, const Pose& X) {
+    add_frame(device.robot, parent, child, X, plan.names);
+    add_alias(device.robot, child, plan.names);
+  };
   const double* q = device.orientation;
   const Pose X_BD{Quat(q[0], q[1], q[2], q[3]),
                   Vec3(device.position[0], device.position[1], device.position[2])};
@@ -841,12 +872,12 @@ void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
       X_PD = link.X_BF.inverse() * X_BD;
     }
   }
-  add_frame(names.frame(device.robot, parent), frame, X_PD);
-  if (is_camera(device.kind)) add_frame(frame, frame + "_optical", kOptical);
+  add(parent, frame, X_PD);
+  if (is_camera(device.kind)) add(frame, frame + "_optical", kOptical);
   for (size_t i = 0; i < device.element_pose.size(); ++i) {
     const std::vector<double>& e = device.element_pose[i];
-    add_frame(frame, frame + "_" + std::to_string(i),
-              Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5])));
+    add(frame, frame + "_" + std::to_string(i),
+        Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5])));
   }
 }
 
@@ -854,8 +885,7 @@ void Conversions::add_links(const std::string& name, const RobotFrames& robot, N
   for (size_t i = 1; i < robot.frames.size(); ++i) {
     const LinkFrame& link = robot.frames[i];
     if (link.motion == LinkFrame::Motion::none)
-      add_frame(names.frame(name, robot.frames[link.parent].name), names.frame(name, link.name),
-                link.X_PF);
+      add_frame(name, robot.frames[link.parent].name, link.name, link.X_PF, names);
   }
   CdrWriter out;
   out.put(robot.description);

@@ -27,6 +27,7 @@ struct ConversionOptions {
   Distro distro = Distro::jazzy;
   std::string root;  // the robot without a namespace; "": none
   Remaps topics;     // of ROS names
+  TfLayout tf = TfLayout::both;
   std::vector<std::pair<std::string, std::string>> channels;  // the bus's --remap
   // The links of the current robots; none: not known.
   std::function<std::map<std::string, RobotFrames>()> robots = [] {
@@ -68,7 +69,10 @@ class Conversions {
   template <class Message>
   void add_route(const channel_info_t& channel, Plan& plan);
   size_t add_topic(Topic topic);
-  void add_frame(const std::string& parent, const std::string& child, const Pose& X);
+  // In each tree of tf that has the robot.
+  void add_frame(const std::string& robot, const std::string& parent, const std::string& child,
+                 const Pose& X, Names& names);
+  void add_alias(const std::string& robot, const std::string& name, Names& names);
   void add_frames(const device_info_t& device, const Plan& plan);
   void add_links(const std::string& name, const RobotFrames& robot, Names& names);
 
@@ -80,7 +84,7 @@ class Conversions {
     std::string parent, child;
     double position[3], orientation[4];  // w, x, y, z
   };
-  std::vector<Frame> frames_;
+  std::map<std::string, std::vector<Frame>> frames_;  // by topic
   std::vector<Standing> standing_;
 };
 

@@ -30,6 +30,13 @@ bool is_absolute_name(std::string_view name) {
 
 }  // namespace
 
+TfLayout parse_tf_layout(const std::string& text) {
+  if (text == "prefixed") return TfLayout::prefixed;
+  if (text == "namespaced") return TfLayout::namespaced;
+  if (text == "both") return TfLayout::both;
+  throw InputError({}, "'" + text + "' is none of prefixed, namespaced, both");
+}
+
 std::string ros_name(const std::string& name) {
   std::string text;
   for (const char c : name) {
@@ -77,7 +84,15 @@ std::string Names::topic(const std::string& robot, const std::string& name) {
 }
 
 std::string Names::frame(const std::string& robot, const std::string& name) const {
-  return (is_plain(robot) ? "" : name_of(robot) + "/") + name;
+  return tf_trees(robot).front().prefix + name;
+}
+
+std::vector<Names::TfTree> Names::tf_trees(const std::string& robot) const {
+  if (is_plain(robot)) return {{"", ""}};
+  std::vector<TfTree> trees;
+  if (tf_ != TfLayout::namespaced) trees.push_back({"", name_of(robot) + "/"});
+  if (tf_ != TfLayout::prefixed) trees.push_back({robot, ""});
+  return trees;
 }
 
 void Names::check_remaps() {

@@ -36,7 +36,7 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
     : options_(std::move(options)),
       transport_(std::move(transport)),
       inject_(std::move(inject)),
-      names_(options_.conversion.root, options_.conversion.topics),
+      names_(options_.conversion.root, options_.conversion.topics, options_.conversion.tf),
       requests_([this](const std::string& channel, std::span<const uint8_t> message) {
         inject_(channel, message);
       }),

@@ -90,7 +90,7 @@ void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
   }
   if (!names_) {
     options_.root = robots.size() == 1 ? robots.front() : "";
-    names_.emplace(options_.root, options_.topics);
+    names_.emplace(options_.root, options_.topics, options_.tf);
   }
   options_.robots = [&scene] {
     return scene.world ? ros2::robot_frames(*scene.world)

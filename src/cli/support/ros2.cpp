@@ -56,6 +56,14 @@ CLI::Option* add_ros2_options(CLI::App& command, Ros2Arguments& arguments) {
       ->type_name("on|off")
       ->check(CLI::IsMember({"on", "off"}))
       ->needs(ros2);
+  command
+      .add_option(
+          "--ros2-tf", arguments.tf,
+          "frames of a robot with a namespace: ALICE/odom on /tf, odom on /ALICE/tf, or both")
+      ->type_name("LAYOUT")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"prefixed", "namespaced", "both"}))
+      ->needs(ros2);
   return ros2;
 }
 
@@ -79,7 +87,8 @@ std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> op
   for (const world::ModelInstance& model : world.models) {
     if (model.is_robot() && !model.removed) robots.push_back(model.name);
   }
-  ros2::Names names(robots.size() == 1 ? robots.front() : "", arguments.topics);
+  ros2::Names names(robots.size() == 1 ? robots.front() : "", arguments.topics,
+                    ros2::parse_tf_layout(arguments.tf));
   names.update({robots.begin(), robots.end()});
   std::vector<std::string> topics;
   for (const std::string& robot : robots) {
@@ -146,9 +155,10 @@ ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments)
   for (const world_info_t& part : server.info()) {
     for (const robot_info_t& robot : part.robots) robots.push_back(robot.name);
   }
-  options.conversion = {distro_of(arguments), robots.size() == 1 ? robots.front() : "",
-                        arguments.topics, arguments.channels,
-                        [&server] { return ros2::robot_frames(*server.world()); }};
+  options.conversion = {
+      distro_of(arguments), robots.size() == 1 ? robots.front() : "",
+      arguments.topics,     ros2::parse_tf_layout(arguments.tf),
+      arguments.channels,   [&server] { return ros2::robot_frames(*server.world()); }};
   options.clock_hz = arguments.clock_hz;
   options.stamped = arguments.stamped.empty() ? options.conversion.distro >= ros2::Distro::kilted
                                               : arguments.stamped == "on";

@@ -26,6 +26,7 @@ struct Ros2Arguments {
   double clock_hz = 100.0;
   std::string stamped;                                        // "on", "off"; "": by the release
   std::string services = "auto";                              // how they are mapped
+  std::string tf = "both";                                    // ros2::parse_tf_layout()
   std::vector<std::pair<std::string, std::string>> topics;    // --remap of ROS names
   std::vector<std::pair<std::string, std::string>> channels;  // of the bus's
   std::vector<std::string> wait_for;                          // ROS topics on which the run waits

@@ -144,6 +144,22 @@ TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
   EXPECT_NO_THROW(one.check_remaps());
 }
 
+TEST(Names, TfHasARobotsFramesWithItsNameOrInItsNamespace) {
+  const auto trees = [](TfLayout layout, const std::string& robot) {
+    std::string found;
+    for (const Names::TfTree& tree : Names("bob", {}, layout).tf_trees(robot))
+      found += "(" + tree.robot + "," + tree.prefix + ")";
+    return found;
+  };
+  EXPECT_EQ(trees(TfLayout::prefixed, "alice"), "(,alice/)");
+  EXPECT_EQ(trees(TfLayout::namespaced, "alice"), "(alice,)");
+  EXPECT_EQ(trees(TfLayout::both, "alice"), "(,alice/)(alice,)");
+  EXPECT_EQ(trees(TfLayout::both, "bob"), "(,)");  // without a namespace
+  EXPECT_EQ(Names("", {}, TfLayout::namespaced).frame("alice", "lrf"), "lrf");
+  EXPECT_EQ(Names("", {}, TfLayout::both).frame("alice", "lrf"), "alice/lrf");
+  EXPECT_THROW(parse_tf_layout("none"), InputError);
+}
+
 TEST(Names, OfTwoRobotsAreNeverOne) {
   Names names("", {});
   names.update({"a-b", "a_b", "a.b"});

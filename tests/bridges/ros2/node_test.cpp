@@ -12,6 +12,7 @@
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/image_t.hpp"
 #include "ruedo/joint_command_t.hpp"
+#include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 
@@ -254,6 +255,80 @@ TEST(Node, KeepsNothingOfRobotsThatAreGone) {
   node.announce(announcement({arm("first")}));
   EXPECT_EQ(shared->ends, ends);
   EXPECT_EQ(read(), topics);
+}
+
+using FramesByTopic = std::map<std::string, std::set<std::string>>;  // "PARENT CHILD"
+
+// What a robot p3at with a namespace publishes of tf, and the frame of its scan.
+FramesByTopic tf_frames(TfLayout layout, std::string& of_scan) {
+  const auto shared = std::make_shared<Middleware>();
+  world_info_t info = robot_with_a_camera();
+  info.channels.push_back(channel<odometry_t>("p3at/odometry", ""));
+  info.nchannels = static_cast<int32_t>(info.channels.size());
+  NodeOptions options;
+  options.conversion.tf = layout;
+  Node node(options, std::make_unique<FakeTransport>(shared), {info},
+            [](const std::string&, std::span<const uint8_t>) {});
+  for (const char* topic : {"/tf", "/tf_static", "/p3at/tf", "/p3at/tf_static", "/p3at/scan"})
+    shared->readers[topic] = 1;
+  const auto publish = [&](const std::string& name, const auto& message) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    node.message({run::Kind::sample, 0, 0, name, {}, 0, bytes.data(), bytes.size()});
+  };
+  publish("p3at/odometry", odometry_t{});
+  publish("p3at/lrf", planar_lidar_t{});
+  FramesByTopic found;
+  for (const auto& [topic, messages] : shared->written) {
+    for (const std::string& message : messages) {
+      CdrReader in(std::span(reinterpret_cast<const uint8_t*>(message.data()), message.size()));
+      if (topic == "/p3at/scan") {
+        in.get<int32_t>(), in.get<uint32_t>();
+        of_scan = in.get_text();
+      }
+      if (topic.find("/tf") == std::string::npos) continue;
+      for (size_t left = in.get_length(1); left > 0; --left) {
+        in.get<int32_t>(), in.get<uint32_t>();
+        const std::string parent = in.get_text(), child = in.get_text();
+        for (int i = 0; i < 7; ++i) in.get<double>();
+        found[topic].insert(parent + " " + child);
+      }
+    }
+  }
+  return found;
+}
+
+TEST(Node, PublishesFramesWithPrefixesAndInNamespaces) {
+  const std::set<std::string> still = {"base_link camera", "base_link lrf",
+                                       "camera camera_optical"};
+  const auto prefixed = [](const std::set<std::string>& frames) {
+    std::set<std::string> all;
+    for (const std::string& each : frames) {
+      const size_t gap = each.find(' ');
+      all.insert("p3at/" + each.substr(0, gap) + " p3at/" + each.substr(gap + 1));
+    }
+    return all;
+  };
+  std::string of_scan;
+  const FramesByTopic with_names = tf_frames(TfLayout::prefixed, of_scan);
+  EXPECT_EQ(with_names, (FramesByTopic{{"/tf", {"p3at/odom p3at/base_link"}},
+                                       {"/tf_static", prefixed(still)}}));
+  EXPECT_EQ(of_scan, "p3at/lrf");
+  const FramesByTopic in_namespace = tf_frames(TfLayout::namespaced, of_scan);
+  EXPECT_EQ(in_namespace,
+            (FramesByTopic{{"/p3at/tf", {"odom base_link"}}, {"/p3at/tf_static", still}}));
+  EXPECT_EQ(of_scan, "lrf");
+
+  // Messages have the names of /tf, which /p3at/tf knows, too.
+  std::set<std::string> tied = still;
+  for (const char* name : {"odom", "base_link", "lrf", "camera", "camera_optical"})
+    tied.insert(std::string(name) + " p3at/" + name);
+  EXPECT_EQ(tf_frames(TfLayout::both, of_scan),
+            (FramesByTopic{{"/tf", with_names.at("/tf")},
+                           {"/tf_static", with_names.at("/tf_static")},
+                           {"/p3at/tf", in_namespace.at("/p3at/tf")},
+                           {"/p3at/tf_static", tied}}));
+  EXPECT_EQ(of_scan, "p3at/lrf");
 }
 
 TEST(Node, CommandsTheRobotWhoseNameInRosItIs) {
