@@ -584,17 +584,20 @@ const world::Drawn& Engine::drawn(int world) const {
 std::vector<int> Engine::channels_of(const std::string& device) const {
   std::vector<int> channels;
   const std::vector<device_info_t>& devices = copies_[0]->world->devices();
+  // Of "camera/depth": the device, and which of the channels below its own.
+  const size_t slash = std::min(device.find('/'), device.size());
+  const std::string name = device.substr(0, slash), below = device.substr(slash);
   for (const bool by_kind : {false, true}) {
     std::string last_robot;
     for (const device_info_t& one : devices) {
-      if (!same_name(by_kind ? one.kind : one.name, device)) continue;
+      if (!same_name(by_kind ? one.kind : one.name, name)) continue;
       if (one.robot == last_robot)
-        throw InputError({}, "robot " + one.robot + " has several devices of kind '" + device +
+        throw InputError({}, "robot " + one.robot + " has several devices of kind '" + name +
                                  "': give one's name");
       last_robot = one.robot;
       const std::vector<Channel>& list = copies_[0]->channels.list();
       const auto found = std::find_if(list.begin(), list.end(), [&](const Channel& channel) {
-        return channel.name == one.robot + "/" + one.name;
+        return channel.name == one.robot + "/" + one.name + below;
       });
       if (found != list.end()) channels.push_back(static_cast<int>(found - list.begin()));
     }

@@ -109,8 +109,8 @@ class Engine {
   const world::Drawn& drawn(int world) const;
 
   // The array of a field, kept up to date for the engine's lifetime. device: a name ("LRF"), or a
-  // kind ("lrf") if each robot has at most one of it. Throws InputError, and EnvironmentError if
-  // pictures cannot be drawn here.
+  // kind ("lrf") if each robot has at most one of it; with a channel below it, "camera/depth".
+  // Throws InputError, and EnvironmentError if pictures cannot be drawn here.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
   // For each copy and driven robot (int32): during how many of the states of the last step() it ran

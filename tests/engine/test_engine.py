@@ -463,7 +463,7 @@ def test_what_is_refused_changes_nothing():
             "no world of that name; there are arena, crossing, empty, field, fleet, maze, office",
         ),
         ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
-        ({"world": 5}, TypeError, "world is a file or the name of a world, not 5"),
+        ({"world": 5}, TypeError, "world is a file, the name of a world or a World, not 5"),
         ({"world": "arena", "worlds": 0}, ValueError, "worlds is 0; allowed are 1 to"),
         ({"world": "arena", "worlds": 2.5}, TypeError, "worlds is a whole number, not 2.5"),
         ({"world": "arena", "seed": -1}, ValueError, "seed is -1; allowed are 0 to"),

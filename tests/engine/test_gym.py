@@ -83,7 +83,7 @@ def test_what_follows_a_saved_episode_is_what_followed(task, mode):
     envs = gymnasium.make_vec(
         f"ruedo/{task}-v0", num_envs=3, autoreset_mode=AutoresetMode(mode)
     ).unwrapped
-    envs.most_actions = 25
+    envs.max_episode_steps = 25
     envs.reset(seed=3)
     envs.action_space.seed(5)
     actions = [envs.action_space.sample() for _ in range(40)]
@@ -351,11 +351,13 @@ def test_a_corridor_leads_to_its_end():
     core, total, steps, target = env._one, 0.0, 0, 1
     terminated = truncated = False
     while not terminated and not truncated:
-        x, y = core._places[0, 0, :2]
+        x, y = core.task.position("robot")[0, :2]
         if target < len(middle) - 1 and math.dist((x, y), middle[target]) < 0.5:
             target += 1
         bearing = math.remainder(
-            math.atan2(middle[target][1] - y, middle[target][0] - x) - core._headings()[0], math.tau
+            math.atan2(middle[target][1] - y, middle[target][0] - x)
+            - core.task.heading("robot")[0],
+            math.tau,
         )
         _, reward, terminated, truncated, info = env.step(
             np.array([1.0 if abs(bearing) < 0.3 else -0.8, np.clip(3 * bearing, -1, 1)])
@@ -401,7 +403,7 @@ def test_a_robot_that_waits_comes_through_a_crowd():
         if not info["success"]:
             continue
         came += 1
-        place = env._one._places[0, 0, :2]
+        place = env.task.position("robot")[0, :2]
         nearer = first - math.dist(place, env.scene.goal)
         assert total == pytest.approx(nearer + 5.0 - 0.01 * steps, abs=2e-3)
     assert came >= 2
@@ -423,7 +425,7 @@ def test_a_box_can_be_pushed_to_its_place():
         core, goal = env._one, np.array(env.scene.goal)
         done = info = False
         while not done:
-            robot, box = core._places[0, 0, :2], core._places[0, 1, :2]
+            robot, box = core.task.position("robot")[0, :2], core.task.position("box")[0, :2]
             way = (goal - box) / np.linalg.norm(goal - box)
             side = np.array([-way[1], way[0]])
             behind, beside = (robot - box) @ way, (robot - box) @ side
@@ -436,7 +438,9 @@ def test_a_box_can_be_pushed_to_its_place():
                 if behind > 0.2:
                     target = box + (1.0 if beside > 0 else -1.0) * side
             ahead = target - robot
-            bearing = math.remainder(math.atan2(ahead[1], ahead[0]) - core._headings()[0], math.tau)
+            bearing = math.remainder(
+                math.atan2(ahead[1], ahead[0]) - core.task.heading("robot")[0], math.tau
+            )
             speed = 0.6 if abs(bearing) < 0.3 else 0.0
             _, _, terminated, truncated, info = env.step(
                 np.array([speed, np.clip(2.5 * bearing, -1, 1)])
@@ -462,8 +466,10 @@ def test_a_camera_sees_the_red_pillar_ahead():
         picture, *_ = env.step(np.array([-1.0, 0.7]))
     assert red(picture).any()
     core = env._one
-    ahead = core._goals[0] - core._places[0, 0, :2]
-    bearing = math.remainder(math.atan2(ahead[1], ahead[0]) - core._headings()[0], math.tau)
+    ahead = core.task.goals[0] - core.task.position("robot")[0, :2]
+    bearing = math.remainder(
+        math.atan2(ahead[1], ahead[0]) - core.task.heading("robot")[0], math.tau
+    )
     assert abs(bearing) < 0.2
     env.close()
 

@@ -23,7 +23,7 @@ def test_it_reaches_its_goals_in_rooms_that_it_has_never_seen():
     )
     observations, _ = envs.reset(seed=1)
     running, success = np.ones(200, bool), np.zeros(200, bool)
-    for _ in range(envs.most_actions):
+    for _ in range(envs.max_episode_steps):
         observations, _, terminated, truncated, info = envs.step(policy(observations))
         success |= running & info["success"]
         running &= ~(terminated | truncated)

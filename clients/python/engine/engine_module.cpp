@@ -107,7 +107,7 @@ class PyEngine {
            const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
            const std::vector<std::string>& draws, const std::vector<std::string>& plugins,
-           bool record, bool allow_errors) {
+           bool record, bool allow_errors, bool allow_absolute) {
     const std::string world(path.c_str(), path.size());
     for (const std::string& one : plugins) ruedo::load_plugin(one);
     ruedo::world::LoadOptions options;
@@ -116,6 +116,7 @@ class PyEngine {
     for (const std::string& one : settings)
       options.settings.push_back(ruedo::world::parse_setting(one));
     options.disabled = disabled;
+    options.allow_absolute = allow_absolute;
     for (const std::string& one : faults) options.faults.push_back(ruedo::world::parse_fault(one));
     ruedo::engine::EngineOptions engine;
     engine.worlds = worlds;
@@ -143,6 +144,7 @@ class PyEngine {
     for (const std::string& one : disabled) result_options_.push_back("--disable=" + one);
     for (const std::string& one : faults) result_options_.push_back("--fault=" + one);
     if (!noise) result_options_.push_back("--no-noise");
+    if (allow_absolute) result_options_.push_back("--allow-absolute");
     for (const ruedo::Plugin& each : ruedo::loaded_plugins())
       result_options_.push_back("--plugin=" + each.name + "@" + each.sha256);
     records_ = record;
@@ -397,14 +399,14 @@ NB_MODULE(_engine, module) {
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
-                    const std::vector<std::string>&, bool, bool>(),
+                    const std::vector<std::string>&, bool, bool, bool>(),
            nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1,
            nb::arg("seed") = 1, nb::arg("noise") = true, nb::arg("threads") = 0,
            nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(),
            nb::arg("set") = nb::list(), nb::arg("disable") = nb::list(),
            nb::arg("fault") = nb::list(), nb::arg("randomize") = nb::list(),
            nb::arg("plugin") = nb::list(), nb::arg("record") = false,
-           nb::arg("allow_errors") = false)
+           nb::arg("allow_errors") = false, nb::arg("allow_absolute") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step, nb::arg("steps"), nb::arg("which") = nb::none())
       .def("drive", &PyEngine::drive)

@@ -35,6 +35,7 @@ from .arguments import (
     word,
 )
 from .arguments import text as checked_text
+from .world import World
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -84,16 +85,18 @@ class SavedWorld(Saved):
 class Engine:
     """Copies of one world.
 
-    world: a file, or the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH;
-    with ``text``, what the text is called. worlds: how many copies. seed: of copy 0; copy i has
-    ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0 for all. spawn
+    world: a file, the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH, or a
+    :class:`World`; with ``text``, what the text is called. worlds: how many copies. seed: of copy
+    0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0
+    for all. spawn
     ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate":
     10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
     randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
     "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. plugin: shared libraries with
     sensors or drives of your own, which stay for the life of the process. record: keep the messages
     of the last call, for :meth:`messages`. allow_errors: take a world in which something is missing
-    or wrong as it is.
+    or wrong as it is. allow_absolute: absolute paths in files may lead out of the folders that are
+    searched, as they may in a :class:`World`.
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
     is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
@@ -103,7 +106,7 @@ class Engine:
 
     def __init__(
         self,
-        world: str | os.PathLike[str] = "world",
+        world: str | os.PathLike[str] | World = "world",
         *,
         text: str | None = None,
         worlds: int = 1,
@@ -119,9 +122,14 @@ class Engine:
         plugin: Iterable[str | os.PathLike[str]] = (),
         record: bool = False,
         allow_errors: bool = False,
+        allow_absolute: bool = False,
     ) -> None:
+        if isinstance(world, World):
+            if text is not None:
+                raise TypeError("Engine() needs either a World or a text")
+            world, text, allow_absolute = "world", str(world), True
         if not isinstance(world, (str, os.PathLike)):
-            raise TypeError(f"world is a file or the name of a world, not {shown(world)}")
+            raise TypeError(f"world is a file, the name of a world or a World, not {shown(world)}")
         if not word("world", world):
             raise ValueError("world is '': it is a file or the name of a world")
         if not isinstance(text, (str, type(None))):
@@ -150,6 +158,7 @@ class Engine:
             plugin=texts("plugin", plugin),
             record=switch("record", record),
             allow_errors=switch("allow_errors", allow_errors),
+            allow_absolute=switch("allow_absolute", allow_absolute),
         )
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
@@ -248,9 +257,10 @@ class Engine:
         device.
 
         name: DEVICE.FIELD; the device by its name ("LRF.ranges") or its kind ("lrf.ranges",
-        "odometry.theta", "pose.pos"), the field as in the message type. It is a view of the
-        engine's memory, cannot be written to, and is written anew by ``step`` and ``reset``: copy
-        what you keep. Robots are those that have the device, in the order of the world file.
+        "odometry.theta", "pose.pos"), with the channel below it for a camera's
+        ("camera/depth.data"), the field as in the message type. It is a view of the engine's
+        memory, cannot be written to, and is written anew by ``step`` and ``reset``: copy what you
+        keep. Robots are those that have the device, in the order of the world file.
         """
         if not isinstance(name, str):
             raise TypeError(f"a field is named by a text, DEVICE.FIELD, not by {shown(name)}")
@@ -333,14 +343,14 @@ class Engine:
         self,
         worlds: int | Sequence[int] | NDArray[Any] | None = None,
         seed: int | Sequence[int] | None = None,
-        text: str | Sequence[str] | None = None,
+        text: str | World | Sequence[str | World] | None = None,
     ) -> None:
         """Makes copies as they were at the beginning; what follows equals a fresh run.
 
         worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the
         first, counted up; None: the one that the copy has. text: another world for these copies
-        from now on, as SDF, or one for each of them, with the same robots and devices. The files
-        that texts name are read once, when they are first named.
+        from now on, as SDF or a :class:`World`, or one for each of them, with the same robots and
+        devices. The files that texts name are read once, when they are first named.
         """
         indices = self._indices(worlds)
         count = len(indices)
@@ -356,7 +366,10 @@ class Engine:
         if text is None:
             worlds_of = []
         else:
-            worlds_of = texts("text", [text] * count if isinstance(text, str) else text)
+            given = [text] * count if isinstance(text, (str, World)) else text
+            if isinstance(given, (list, tuple)):
+                given = [str(one) if isinstance(one, World) else one for one in given]
+            worlds_of = texts("text", given)
             if len(worlds_of) != count:
                 raise ValueError(f"{len(worlds_of)} texts for {count} worlds")
         self._core.reset(indices, seeds, worlds_of)

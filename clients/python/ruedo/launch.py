@@ -96,6 +96,7 @@ def launch(
     timeout = arguments.number("timeout", timeout)
     name = arguments.client_name(name)
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
+    options += ["--allow-absolute"] * isinstance(world, World)  # this program chose its files
     port = _free_port() if view else 0
     if port:
         options += ["--view", str(port)]

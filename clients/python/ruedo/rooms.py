@@ -156,7 +156,8 @@ def _square(size: float) -> list[str]:
 
 def _robot(name: str, model: str, start: tuple[float, float, float]) -> str:
     place = f"{start[0]:.4f} {start[1]:.4f} 0 0 0 {start[2]:.4f}"
-    return f"<include><uri>model://{model}</uri><name>{name}</name><pose>{place}</pose></include>"
+    uri = model if "/" in model else f"model://{model}"
+    return f"<include><uri>{uri}</uri><name>{name}</name><pose>{place}</pose></include>"
 
 
 def _world(name: str, models: list[str]) -> str:

@@ -9,15 +9,20 @@ from pathlib import Path
 
 from . import arguments
 
+Colour = tuple[float, float, float]
+
 
 class World:
     """Builds a world: a plane, and what is put on it. Lengths in m, angles in rad, positions of
     centres.
 
-        world = World().wall(0, 3, 6, 3).box(2, 1).robot("p3at", 0, 0)
+        world = World().wall(0, 3, 6, 3).box(2, 1, colour=(0.9, 0.1, 0.1)).robot("p3at", 0, 0)
         with ruedo.launch(world) as sim: ...
+        engine = ruedo.Engine(world, worlds=64)
 
-    str(world) is its SDF.
+    colour: red, green and blue, each from 0 to 1; None: grey. texture: a picture (PNG, JPEG), which
+    covers each side of a box and goes once around a cylinder; a colour tints it. str(world) is the
+    world's SDF.
     """
 
     def __init__(self, name: str = "built", *, step: float = 0.005):
@@ -34,6 +39,8 @@ class World:
         size: tuple[float, float, float] = (0.5, 0.5, 0.5),
         heading: float = 0.0,
         mass: float | None = None,
+        colour: Colour | None = None,
+        texture: str | os.PathLike[str] | None = None,
         name: str = "box",
     ) -> World:
         """size: along x, y, z. mass: kg, of one that can be pushed; None: it never moves."""
@@ -41,7 +48,13 @@ class World:
         inertia = None if mass is None else (b * b + c * c, a * a + c * c, a * a + b * b)
         shape = f"<box><size>{a!r} {b!r} {c!r}</size></box>"
         return self._add(
-            name, shape, (x, y, c / 2.0), heading, mass, inertia and [i / 12.0 for i in inertia]
+            name,
+            shape,
+            (x, y, c / 2.0),
+            heading,
+            mass,
+            inertia and [i / 12.0 for i in inertia],
+            _material(colour, texture),
         )
 
     def cylinder(
@@ -52,6 +65,8 @@ class World:
         radius: float = 0.25,
         height: float = 0.5,
         mass: float | None = None,
+        colour: Colour | None = None,
+        texture: str | os.PathLike[str] | None = None,
         name: str = "cylinder",
     ) -> World:
         """Upright. mass: kg, of one that can be pushed; None: it never moves."""
@@ -64,6 +79,7 @@ class World:
             0.0,
             mass,
             None if mass is None else [side, side, r * r / 2.0],
+            _material(colour, texture),
         )
 
     def wall(
@@ -75,6 +91,8 @@ class World:
         *,
         height: float = 1.0,
         thickness: float = 0.1,
+        colour: Colour | None = None,
+        texture: str | os.PathLike[str] | None = None,
         name: str = "wall",
     ) -> World:
         """From one point to another, which are the middle of its ends."""
@@ -86,6 +104,8 @@ class World:
             (y1 + y2) / 2.0,
             size=(length, thickness, height),
             heading=math.atan2(y2 - y1, x2 - x1),
+            colour=colour,
+            texture=texture,
             name=name,
         )
 
@@ -110,6 +130,13 @@ class World:
         )
         return self
 
+    def sdf(self, element: str) -> World:
+        """Adds an element of SDF to the ``<world>`` as it is: whatever this class has no method
+        for, such as ``<ruedo:crowd>``, a heightmap or a model of your own.
+        """
+        self._models.append(arguments.text("element", element))
+        return self
+
     def __str__(self) -> str:
         lines = "\n    ".join(
             [
@@ -119,7 +146,7 @@ class World:
             ]
         )
         return (
-            f'<sdf version="1.9">\n  <world name="{escape(self._name)}">\n'
+            f'<sdf version="1.9" xmlns:ruedo="urn:ruedo">\n  <world name="{escape(self._name)}">\n'
             f'    <physics name="step" type="bullet"><max_step_size>{self._step!r}</max_step_size></physics>\n    {lines}\n  </world>\n</sdf>\n'
         )
 
@@ -134,6 +161,7 @@ class World:
         heading: float,
         mass: float | None,
         inertia_of_1_kg: list[float] | None,
+        material: str,
     ) -> World:
         pose = (
             " ".join(repr(_finite("position", p)) for p in position)
@@ -151,7 +179,7 @@ class World:
             body = f"<link name='link'><inertial><mass>{kg!r}</mass><inertia>{moments}</inertia></inertial>"
         self._models.append(
             f'<model name="{escape(self._unused(name))}"><pose>{pose}</pose>{body}'
-            f"<collision name='collision'>{geometry}</collision><visual name='visual'>{geometry}</visual></link></model>"
+            f"<collision name='collision'>{geometry}</collision><visual name='visual'>{geometry}{material}</visual></link></model>"
         )
         return self
 
@@ -162,6 +190,27 @@ class World:
             own = f"{name}_{number}"
         self._names.add(own)
         return own
+
+
+def _material(colour: Colour | None, texture: str | os.PathLike[str] | None) -> str:
+    if colour is None and texture is None:
+        return ""
+    rgb = (1.0, 1.0, 1.0) if colour is None else colour
+    if not isinstance(rgb, (tuple, list)) or len(rgb) != 3:
+        raise ValueError(
+            f"colour is {arguments.shown(colour)}: it must be red, green and blue, from 0 to 1"
+        )
+    if not all(0.0 <= _finite("colour", part) <= 1.0 for part in rgb):
+        raise ValueError(f"colour is {arguments.shown(colour)}: its parts must be from 0 to 1")
+    values = " ".join(repr(float(part)) for part in rgb) + " 1"
+    paint = f"<ambient>{values}</ambient><diffuse>{values}</diffuse>"
+    if texture is not None:
+        file = Path(arguments.path("texture", texture)).absolute()
+        if not file.is_file():
+            raise ValueError(f"texture {arguments.shown(str(texture))}: there is no such file")
+        picture = f"<albedo_map>{escape(str(file))}</albedo_map>"
+        paint += f"<pbr><metal>{picture}</metal></pbr>"
+    return f"<material>{paint}</material>"
 
 
 def _finite(what: str, value: float) -> float:

@@ -10,34 +10,53 @@ process, many at once.
 
 ruedo/Navigate-v0, ruedo/Corridor-v0, ruedo/Crowd-v0, ruedo/Push-v0 and ruedo/Camera-v0;
 `FleetEnv` for several robots. docs/environments.md says what each observes, does, is rewarded for
-and succeeds with; the modules of this package say the same in short.
+and succeeds with; the modules of this package say the same in short. `Task` is the base class for
+tasks of your own (docs/tasks.md).
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 try:
     import gymnasium
 except ImportError as _error:
     raise ImportError("ruedo.gym needs gymnasium: pip install gymnasium") from _error
 
-from .camera import CameraEnv, CameraVectorEnv
-from .corridor import CorridorEnv, CorridorVectorEnv
-from .crowd import CrowdEnv, CrowdVectorEnv
-from .navigate import NavigateEnv, NavigateVectorEnv
-from .push import PushEnv, PushVectorEnv
+from .camera import Camera, CameraEnv, CameraVectorEnv
+from .corridor import Corridor, CorridorEnv, CorridorVectorEnv
+from .crowd import Crowd, CrowdEnv, CrowdVectorEnv
+from .drive import DriveTask, GoalTask
+from .environments import SavedEpisodes, TaskEnv, TaskVectorEnv
+from .navigate import Navigate, NavigateEnv, NavigateVectorEnv
+from .push import Push, PushEnv, PushVectorEnv
+from .task import Outcome, Task
 
 __all__ = [
+    "Camera",
     "CameraEnv",
     "CameraVectorEnv",
+    "Corridor",
     "CorridorEnv",
     "CorridorVectorEnv",
+    "Crowd",
     "CrowdEnv",
     "CrowdVectorEnv",
+    "DriveTask",
     "FleetEnv",
+    "GoalTask",
+    "Navigate",
     "NavigateEnv",
     "NavigateVectorEnv",
+    "Outcome",
+    "Push",
     "PushEnv",
     "PushVectorEnv",
+    "SavedEpisodes",
+    "Task",
+    "TaskEnv",
+    "TaskVectorEnv",
+    "register",
 ]
 
 
@@ -52,9 +71,24 @@ def __getattr__(name: str) -> object:
     return FleetEnv
 
 
-for _task in ("Navigate", "Corridor", "Crowd", "Push", "Camera"):
+def register(name: str, task: type[Task]) -> None:
+    """Registers a task of your own, so that `gymnasium.make(name)` and `make_vec` create it:
+    register("mine/Dock-v0", Dock).
+    """
+    if not isinstance(task, type) or not issubclass(task, Task):
+        raise TypeError(f"task is a subclass of ruedo.gym.Task, not {task!r}")
     gymnasium.register(
-        f"ruedo/{_task}-v0",
-        entry_point=f"ruedo.gym:{_task}Env",
-        vector_entry_point=f"ruedo.gym:{_task}VectorEnv",
+        name,
+        entry_point=partial(TaskEnv, task),
+        vector_entry_point=partial(TaskVectorEnv, task),
+        max_episode_steps=task.max_episode_steps if task.max_episode_steps >= 0 else None,
+    )
+
+
+for _task in (Navigate, Corridor, Crowd, Push, Camera):
+    gymnasium.register(
+        f"ruedo/{_task.__name__}-v0",
+        entry_point=f"ruedo.gym:{_task.__name__}Env",
+        vector_entry_point=f"ruedo.gym:{_task.__name__}VectorEnv",
+        max_episode_steps=_task.max_episode_steps,
     )

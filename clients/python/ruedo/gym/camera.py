@@ -12,86 +12,33 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
-
-import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
+from typing import Any
 
 from ..rooms import Room, make_landmark_room
-from .base import DRIVE, Outcome, TaskEnv, TaskVectorEnv, drive_commands, drive_rewards
+from .drive import GoalTask
+from .environments import TaskEnv, TaskVectorEnv
 
-PIXELS = 64
-PILLAR_M = 0.8
+
+class Camera(GoalTask):
+    """options: those of `DriveTask`."""
+
+    sensors = ("camera",)
+    goal_m = 0.8  # between the centres of the robot and the pillar
+    tells_goal = False
+
+    def scene(self, number: int) -> Room:
+        return make_landmark_room(number, robot=self.robot)
 
 
 class CameraVectorEnv(TaskVectorEnv):
-    """``num_envs`` of them in one engine."""
+    """``num_envs`` of them in one engine. options: those of `TaskVectorEnv` and `Camera`."""
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        split: Literal["train", "test"] = "train",
-        noise: bool = True,
-        threads: int = 0,
-        randomize: dict[str, str] | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        render_mode: Literal["rgb_array", "human"] | None = None,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            spaces.Box(0, 255, (PIXELS, PIXELS, 3), np.uint8),
-            DRIVE,
-            split=split,
-            noise=noise,
-            threads=threads,
-            autoreset_mode=autoreset_mode,
-            render_mode=render_mode,
-            settings={
-                "robot/camera.camera.image.width": PIXELS,
-                "robot/camera.camera.image.height": PIXELS,
-                "robot/camera.encoding": "rgb",
-                "robot/camera.update_rate": 10,
-            },
-            disabled=("robot/lrf", "robot/sonar_front", "robot/sonar_rear"),
-            randomize=randomize,
-        )
-        self._touching = self._engine.touching()[:, 0]
-        self._goals = np.zeros((num_envs, 2))
-        self._distance = np.zeros(num_envs)
-
-    def _scene(self, number: int) -> Room:
-        return make_landmark_room(number)
-
-    def _begun(self, indices: NDArray[np.intp]) -> None:
-        for i in indices:
-            self._goals[i] = self._scenes[i].goal
-        self._distance[indices] = self._distances()[indices]
-
-    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        return drive_commands(actions)
-
-    def _outcome(self) -> Outcome:
-        before, self._distance = self._distance, self._distances()
-        success = self._distance < PILLAR_M
-        collision = (self._touching > 0) & ~success
-        rewards = drive_rewards(before - self._distance, success, collision)
-        return rewards, success, collision
-
-    def _distances(self) -> NDArray[np.float64]:
-        distances: NDArray[np.float64] = np.linalg.norm(
-            self._goals - self._places[:, 0, :2], axis=1
-        )
-        return distances
-
-    def _observe(self) -> NDArray[np.uint8]:
-        pictures = self._engine.observe("camera.data")[:, 0]
-        return pictures.reshape(self.num_envs, PIXELS, PIXELS, 3).copy()
+    def __init__(self, num_envs: int = 1, **options: Any) -> None:
+        super().__init__(Camera, num_envs, **options)
 
 
 class CameraEnv(TaskEnv):
     """One of them."""
 
-    task = CameraVectorEnv
+    def __init__(self, **options: Any) -> None:
+        super().__init__(Camera, **options)

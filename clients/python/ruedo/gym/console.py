@@ -24,7 +24,15 @@ class Console:
             self._port = probe.getsockname()[1]
         self._simulation: Simulation | None = None
 
-    def begin(self, text: str, seed: int, options: dict[str, Any], robots: tuple[str, ...]) -> None:
+    def begin(
+        self,
+        file: str | None,
+        text: str,
+        seed: int,
+        options: dict[str, Any],
+        robots: tuple[str, ...],
+    ) -> None:
+        """file: the world's, instead of the text; None: there is none."""
         first = self._simulation is None
         self.close()
         if options["randomize"]:
@@ -32,13 +40,14 @@ class Console:
                 "render_mode 'human' cannot show what randomize draws; 'rgb_array' can"
             )
         self._simulation = launch(
-            text=text,
+            file,
+            text=text if file is None else None,
             seed=seed,
             lockstep=1,
             set=options["set"],
             disable=options["disable"],
             noise=options["noise"],
-            args=["--view", str(self._port)],
+            args=["--view", str(self._port), *([] if file else ["--allow-absolute"])],
         )
         self._robots = [self._simulation.robot(name) for name in robots]
         if first:
@@ -46,13 +55,13 @@ class Console:
             print(f"the console is at {address}", file=sys.stderr)
             webbrowser.open(address)
 
-    def step(self, commands: NDArray[Any]) -> None:
+    def step(self, commands: NDArray[Any], n: int) -> None:
         assert self._simulation
         self._simulation.step(
-            20,
+            n,
             [
-                robot.velocity_command(float(v), float(omega))
-                for robot, (v, omega) in zip(self._robots, commands)
+                robot.velocity_command(v, omega, *side)
+                for robot, (v, *side, omega) in zip(self._robots, commands.tolist())
             ],
         )
 

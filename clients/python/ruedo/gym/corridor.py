@@ -14,87 +14,44 @@ its end.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from ..rooms import Corridor, make_corridor
-from .base import (
-    DRIVE,
-    SPEED_M_S,
-    Outcome,
-    TaskEnv,
-    TaskVectorEnv,
-    checked_beams,
-    clipped,
-    drive_commands,
-    drive_rewards,
-    seen,
-)
+from ..rooms import Corridor as Scene
+from ..rooms import make_corridor
+from .drive import DriveTask
+from .environments import TaskEnv, TaskVectorEnv
+from .task import Outcome, clipped
 
 END_M = 0.5  # from the end: it is reached
 PIECES = 6
 
 
-class CorridorVectorEnv(TaskVectorEnv):
-    """``num_envs`` of them in one engine."""
+class Corridor(DriveTask):
+    """options: those of `DriveTask`."""
 
-    most_actions = 800
+    max_episode_steps = 800
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        beams: int = 24,
-        split: Literal["train", "test"] = "train",
-        noise: bool = True,
-        threads: int = 0,
-        randomize: dict[str, str] | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        render_mode: Literal["rgb_array", "human"] | None = None,
-    ) -> None:
-        self._beams = checked_beams(beams)
-        low = np.concatenate([np.zeros(beams), [-2.0, -4.0]]).astype(np.float32)
-        high = np.concatenate([np.ones(beams), [2.0, 4.0]]).astype(np.float32)
-        super().__init__(
-            num_envs,
-            spaces.Box(low, high, dtype=np.float32),
-            DRIVE,
-            split=split,
-            noise=noise,
-            threads=threads,
-            autoreset_mode=autoreset_mode,
-            render_mode=render_mode,
-            settings={"robot/lrf.lidar.scan.horizontal.samples": beams},
-            disabled=("robot/camera", "robot/sonar_front", "robot/sonar_rear"),
-            randomize=randomize,
-        )
-        self._ranges = self._engine.observe("lrf.ranges")[:, 0]
-        self._speed = self._engine.observe("odometry.v")[:, 0]
-        self._turn = self._engine.observe("odometry.omega")[:, 0]
-        self._touching = self._engine.touching()[:, 0]
-        self._middles = np.zeros((num_envs, PIECES + 1, 2))
-        self._way = np.zeros(num_envs)
+    def setup(self) -> None:
+        super().setup()
+        self._position = self.position("robot")[:, :2]
+        self._middles = np.zeros((self.num_envs, PIECES + 1, 2))
+        self._way = np.zeros(self.num_envs)
 
-    def _scene(self, number: int) -> Corridor:
-        return make_corridor(number, pieces=PIECES)
+    def scene(self, number: int) -> Scene:
+        return make_corridor(number, robot=self.robot, pieces=PIECES)
 
-    def _begun(self, indices: NDArray[np.intp]) -> None:
-        for i in indices:
-            self._middles[i] = self._scenes[i].middle
-        self._way[indices] = self._ways()[indices]
+    def begin(self, episodes: NDArray[np.intp]) -> None:
+        for i in episodes:
+            self._middles[i] = self.scenes[i].middle
+        self._way[episodes] = self._ways()[episodes]
 
-    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        return drive_commands(actions)
-
-    def _outcome(self) -> Outcome:
+    def outcome(self) -> Outcome:
         before, self._way = self._way, self._ways()
         success = self._way > self._lengths().sum(axis=1) - END_M
-        collision = (self._touching > 0) & ~success
-        return drive_rewards(self._way - before, success, collision), success, collision
+        return self.rewarded(self._way - before, success, (self._touching > 0) & ~success)
 
     def _lengths(self) -> NDArray[np.float64]:
         lengths: NDArray[np.float64] = np.linalg.norm(np.diff(self._middles, axis=1), axis=2)
@@ -103,7 +60,7 @@ class CorridorVectorEnv(TaskVectorEnv):
     def _ways(self) -> NDArray[np.float64]:
         """How far along the middle the nearest point of it lies, m."""
         begin, along = self._middles[:, :-1], np.diff(self._middles, axis=1)
-        here = self._places[:, 0, None, :2] - begin
+        here = self._position[:, None] - begin
         length = self._lengths()
         part = clipped((here * along).sum(axis=2) / np.maximum(length**2, 1e-12), 0.0, 1.0)
         apart = np.linalg.norm(here - part[..., None] * along, axis=2)
@@ -114,15 +71,16 @@ class CorridorVectorEnv(TaskVectorEnv):
         )[:, 0]
         return way
 
-    def _observe(self) -> NDArray[np.float32]:
-        result = np.empty((self.num_envs, self._beams + 2), np.float32)
-        result[:, : self._beams] = seen(self._ranges)
-        result[:, -2] = clipped(self._speed / SPEED_M_S, -2.0, 2.0)
-        result[:, -1] = clipped(self._turn, -4.0, 4.0)
-        return result
+
+class CorridorVectorEnv(TaskVectorEnv):
+    """``num_envs`` of them in one engine. options: those of `TaskVectorEnv` and `Corridor`."""
+
+    def __init__(self, num_envs: int = 1, **options: Any) -> None:
+        super().__init__(Corridor, num_envs, **options)
 
 
 class CorridorEnv(TaskEnv):
     """One of them."""
 
-    task = CorridorVectorEnv
+    def __init__(self, **options: Any) -> None:
+        super().__init__(Corridor, **options)

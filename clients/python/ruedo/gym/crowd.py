@@ -18,30 +18,36 @@ from typing import Any
 
 from ..arguments import whole
 from ..rooms import Room, make_crowd_hall
-from .base import TaskEnv
-from .navigate import NavigateVectorEnv
+from .drive import GoalTask
+from .environments import TaskEnv, TaskVectorEnv
 
 MOST_PEOPLE = 50
 
 
-class CrowdVectorEnv(NavigateVectorEnv):
-    """``num_envs`` of them in one engine. options: those of `NavigateVectorEnv` but for
-    ``obstacles``.
-    """
+class Crowd(GoalTask):
+    """people: how many walk in a hall, 0 to 50. options: those of `DriveTask`."""
 
-    most_actions = 600
+    max_episode_steps = 600
 
-    def __init__(self, num_envs: int = 1, *, people: int = 8, **options: Any) -> None:
+    def __init__(self, *, people: int = 8, **options: Any) -> None:
         if "obstacles" in options:
             raise TypeError("Crowd-v0 has no obstacles but people: people=8")
-        self._people = whole("people", people, 0, MOST_PEOPLE)
-        super().__init__(num_envs, **options)
+        super().__init__(**options)
+        self.people = whole("people", people, 0, MOST_PEOPLE)
 
-    def _scene(self, number: int) -> Room:
-        return make_crowd_hall(number, people=self._people)
+    def scene(self, number: int) -> Room:
+        return make_crowd_hall(number, robot=self.robot, people=self.people)
+
+
+class CrowdVectorEnv(TaskVectorEnv):
+    """``num_envs`` of them in one engine. options: those of `TaskVectorEnv` and `Crowd`."""
+
+    def __init__(self, num_envs: int = 1, **options: Any) -> None:
+        super().__init__(Crowd, num_envs, **options)
 
 
 class CrowdEnv(TaskEnv):
     """One of them."""
 
-    task = CrowdVectorEnv
+    def __init__(self, **options: Any) -> None:
+        super().__init__(Crowd, **options)

@@ -20,19 +20,21 @@ from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore
 from ..arguments import whole
 from ..engine import Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, make_fleet_room
-from .base import (
+from .drive import GOAL_M, MOST_SPEED, goal_term
+from .environments import MOST_SEED, PICTURE, MadeAnew, check_options
+from .task import (
     DRIVE,
-    MOST_SEED,
-    PICTURE,
-    STEPS,
-    MadeAnew,
-    check_options,
+    SPEED_M_S,
     checked_actions,
-    checked_beams,
+    clipped,
     drive_commands,
     drive_rewards,
+    headings,
+    seen,
 )
-from .navigate import GOAL_M, LIMITS, observation
+
+STEPS = 20  # of 5 ms in an action
+LIMITS = np.array([1.0, 1.0, 1.0, *MOST_SPEED], np.float32)  # of what follows the beams
 
 Each = dict[str, Any]
 
@@ -74,7 +76,9 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         self.possible_agents = [f"robot{i}" for i in range(robots)]
         self.agents: list[str] = []
         self.render_mode = render_mode
-        low = np.concatenate([np.zeros(checked_beams(beams) + 1), -LIMITS[1:]]).astype(np.float32)
+        low = np.concatenate([np.zeros(whole("beams", beams, 2, 1024) + 1), -LIMITS[1:]]).astype(
+            np.float32
+        )
         high = np.concatenate([np.ones(beams), LIMITS]).astype(np.float32)
         self._spaces = {
             name: spaces.Box(low, high, dtype=np.float32) for name in self.possible_agents
@@ -217,10 +221,15 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
 
     def _observations(self) -> NDArray[np.float32]:
         count = len(self.possible_agents)
-        w, x, y, z = self._turned[:count].T
-        heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         to_goal = np.array(self._goals) - self._places[:count, :2]
-        return observation(self._ranges, to_goal, heading, self._speed, self._turn)
+        row = [
+            seen(self._ranges),
+            goal_term(to_goal, headings(self._turned[:count])),
+            self._speed[:, None] / SPEED_M_S,
+            self._turn[:, None],
+        ]
+        space = self._spaces[self.possible_agents[0]]
+        return clipped(np.concatenate(row, axis=1, dtype=np.float32), space.low, space.high)
 
     def _of_agents(self, values: Any) -> Each:
         return {

@@ -16,109 +16,99 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..rooms import PushRoom, make_push_room
-from .base import DRIVE, SPEED_M_S, TURN_RAD_S, Outcome, TaskEnv, TaskVectorEnv, clipped
+from .drive import DriveTask, Terms
+from .environments import TaskEnv, TaskVectorEnv
+from .task import SPEED_M_S, Outcome
 
 PLACE_M = 0.3
 ROOM_M = 6.0
-LIMITS = np.array([2.0] * 4 + [1.0] * 2 + [2.0] * 4 + [1.0] * 2 + [2.0, 4.0], np.float32)
-ROBOT, BOX = 0, 1  # of those that have a pose
+# Of each term: how many numbers, and the most.
+TERMS = {
+    "box": (2, 2.0),
+    "place": (2, 2.0),
+    "turned": (2, 1.0),
+    "walls": (4, 2.0),
+    "heading": (2, 1.0),
+}
 
 
-class PushVectorEnv(TaskVectorEnv):
-    """``num_envs`` of them in one engine."""
+class Push(DriveTask):
+    """options: those of `DriveTask`."""
 
-    most_actions = 600
+    max_episode_steps = 600
+    sensors = ("odometry",)
+    slowest_m_s = -SPEED_M_S
+    choices = ((1.0, 0.0), (0.5, 1.0), (0.5, -1.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0))
+    weights = {"progress": 2.0, "approach": 0.2, "success": 5.0, "step": -0.01}
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        split: Literal["train", "test"] = "train",
-        noise: bool = True,
-        threads: int = 0,
-        randomize: dict[str, str] | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        render_mode: Literal["rgb_array", "human"] | None = None,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            spaces.Box(-LIMITS, LIMITS, dtype=np.float32),
-            DRIVE,
-            split=split,
-            noise=noise,
-            threads=threads,
-            autoreset_mode=autoreset_mode,
-            render_mode=render_mode,
-            disabled=("robot/camera", "robot/lrf", "robot/sonar_front", "robot/sonar_rear"),
-            randomize=randomize,
-        )
-        self._speed = self._engine.observe("odometry.v")[:, 0]
-        self._turn = self._engine.observe("odometry.omega")[:, 0]
-        self._goals = np.zeros((num_envs, 2))
-        self._apart = np.zeros((num_envs, 2))  # box to place, robot to box
+    def __init__(self, **options: Any) -> None:
+        terms = {
+            name: spaces.Box(-most, most, (count,), np.float32)
+            for name, (count, most) in TERMS.items()
+        }
+        super().__init__(terms, **options)
 
-    def _scene(self, number: int) -> PushRoom:
-        return make_push_room(number, size=ROOM_M)
+    def setup(self) -> None:
+        super().setup()
+        self._robot, self._box = self.position("robot")[:, :2], self.position("box")[:, :2]
+        self._goals = np.zeros((self.num_envs, 2))
+        self._apart = np.zeros((self.num_envs, 2))  # box to place, robot to box
 
-    def _begun(self, indices: NDArray[np.intp]) -> None:
-        for i in indices:
-            self._goals[i] = self._scenes[i].goal
-        self._apart[indices] = self._distances()[indices]
+    def scene(self, number: int) -> PushRoom:
+        return make_push_room(number, robot=self.robot, size=ROOM_M)
 
-    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        wanted = clipped(np.asarray(actions, np.float64).reshape(-1, 1, 2), -1.0, 1.0)
-        return wanted * (SPEED_M_S, TURN_RAD_S)
+    def begin(self, episodes: NDArray[np.intp]) -> None:
+        for i in episodes:
+            self._goals[i] = self.scenes[i].goal
+        self._apart[episodes] = self._distances()[episodes]
 
-    def _outcome(self) -> Outcome:
+    def outcome(self) -> Outcome:
         before, self._apart = self._apart, self._distances()
         nearer = before - self._apart
         success = self._apart[:, 0] < PLACE_M
-        rewards = 2.0 * nearer[:, 0] + 0.2 * nearer[:, 1] + 5.0 * success - 0.01
-        return rewards, success, np.zeros(self.num_envs, bool)
+        outcome = self.rewarded(nearer[:, 0], success, np.zeros_like(success))
+        rewards = outcome.rewards + self.weights["approach"] * nearer[:, 1]
+        return outcome._replace(rewards=rewards)
+
+    def terms(self) -> Terms:
+        heading, of_box = self.heading("robot"), self.heading("box")
+        cos, sin = np.cos(heading), np.sin(heading)
+        turned, half = 4.0 * (of_box - heading), ROOM_M / 2
+
+        def seen_from_robot(way: NDArray[np.float64]) -> NDArray[np.float64]:
+            ahead = cos * way[:, 0] + sin * way[:, 1]
+            return np.stack([ahead, cos * way[:, 1] - sin * way[:, 0]], axis=1) / ROOM_M
+
+        return {
+            "box": seen_from_robot(self._box - self._robot),
+            "place": seen_from_robot(self._goals - self._box),
+            "turned": np.stack([np.cos(turned), np.sin(turned)], axis=1),
+            "walls": np.concatenate([half - self._robot, half + self._robot], axis=1) / ROOM_M,
+            "heading": np.stack([cos, sin], axis=1),
+        }
 
     def _distances(self) -> NDArray[np.float64]:
-        box, robot = self._places[:, BOX, :2], self._places[:, ROBOT, :2]
-        return np.stack(
-            [np.linalg.norm(self._goals - box, axis=1), np.linalg.norm(box - robot, axis=1)], axis=1
-        )
+        ways = np.stack([self._goals - self._box, self._box - self._robot], axis=1)
+        distances: NDArray[np.float64] = np.linalg.norm(ways, axis=2)
+        return distances
 
-    def _observe(self) -> NDArray[np.float32]:
-        robot, box = self._places[:, ROBOT, :2], self._places[:, BOX, :2]
-        heading, of_box = self._headings(ROBOT), self._headings(BOX)
-        cos, sin = np.cos(heading), np.sin(heading)
 
-        def seen_from_robot(way: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-            return [
-                (cos * way[:, 0] + sin * way[:, 1]) / ROOM_M,
-                (cos * way[:, 1] - sin * way[:, 0]) / ROOM_M,
-            ]
+class PushVectorEnv(TaskVectorEnv):
+    """``num_envs`` of them in one engine. options: those of `TaskVectorEnv` and `Push`."""
 
-        half = ROOM_M / 2
-        columns = [
-            *seen_from_robot(box - robot),
-            *seen_from_robot(self._goals - box),
-            np.cos(4.0 * (of_box - heading)),
-            np.sin(4.0 * (of_box - heading)),
-            *((half - robot).T / ROOM_M),
-            *((half + robot).T / ROOM_M),
-            cos,
-            sin,
-            self._speed / SPEED_M_S,
-            self._turn,
-        ]
-        result = np.stack(columns, axis=1).astype(np.float32)
-        return clipped(result, -LIMITS, LIMITS)
+    def __init__(self, num_envs: int = 1, **options: Any) -> None:
+        super().__init__(Push, num_envs, **options)
 
 
 class PushEnv(TaskEnv):
     """One of them."""
 
-    task = PushVectorEnv
+    def __init__(self, **options: Any) -> None:
+        super().__init__(Push, **options)

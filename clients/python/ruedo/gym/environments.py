@@ -1,11 +1,14 @@
-"""What the tasks have in common: episodes in the copies of one engine, Gymnasium's modes of
-autoreset, pictures of the scene.
+"""Tasks as environments of Gymnasium: episodes in the copies of one engine, the modes of autoreset,
+pictures of the scene.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
@@ -15,23 +18,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..arguments import array, shown, whole
+from ..arguments import named, shown, texts, whole
 from ..engine import MOST_WORLDS, Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, Scene
+from ..world import World
+from .task import Outcome, Task, checked_actions
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
     from .console import Console
 
-STEPS = 20  # of the world in an action: 0.1 s
 PICTURE = 256  # pixels, the width and height of a rendered frame
 MODES = (None, "rgb_array", "human")
 
 MOST_SEED = 2**128 - 1  # that of numpy's SeedSequence
 
 Info = dict[str, Any]
-Outcome = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
 
 
 class _SavedEpisode:
@@ -82,11 +85,15 @@ def _make_anew(kind: type, arguments: tuple[Any, ...], options: Info) -> Any:
 
 
 class TaskVectorEnv(MadeAnew, VectorEnv):
-    """``num_envs`` episodes of a task, each in a scene of its own.
+    """``num_envs`` episodes of a task, each in a scene of its own, in one engine on all cores.
 
-    A task says which scene has which number (`_scene`), what an action commands (`_commands`), what
-    came of it (`_outcome`) and what is observed (`_observe`). What it keeps of its episodes are
-    arrays with a row for each environment, as attributes of its own: `save` saves these.
+        envs = TaskVectorEnv(MyTask, num_envs=64)
+
+    task: a subclass of `Task`. Options that are not listed here go to its constructor. split: which
+    scenes, "train" or "test"; no scene is in both. noise: False gives ideal sensors. threads: at
+    most so many cores, 0 for all. randomize, set and disable: as those of `ruedo.Engine`; what was
+    drawn is in ``info["drawn"]`` when an episode begins. max_episode_steps: actions until an
+    episode is truncated; None: the task's own number, -1: never.
     """
 
     metadata: Info = {
@@ -94,23 +101,25 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
-    most_actions = 400
 
     def __init__(
         self,
-        num_envs: int,
-        observations: spaces.Space[Any],
-        actions: spaces.Space[Any],
+        task: type[Task],
+        num_envs: int = 1,
         *,
-        split: Literal["train", "test"],
-        noise: bool,
-        threads: int,
-        autoreset_mode: AutoresetMode | str,
-        render_mode: Literal["rgb_array", "human"] | None,
-        settings: dict[str, object] | None = None,
-        disabled: tuple[str, ...] = (),
+        split: Literal["train", "test"] = "train",
+        noise: bool = True,
+        threads: int = 0,
         randomize: dict[str, str] | None = None,
+        set: Mapping[str, object] | None = None,
+        disable: Iterable[str] = (),
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: Literal["rgb_array", "human"] | None = None,
+        **options: Any,
     ) -> None:
+        if not isinstance(task, type) or not issubclass(task, Task):
+            raise TypeError(f"task is a subclass of ruedo.gym.Task, not {shown(task)}")
         num_envs = whole("num_envs", num_envs, 1, MOST_WORLDS)
         if split not in ("train", "test"):
             raise ValueError(f"split is {shown(split)}; allowed are 'train' and 'test'")
@@ -120,58 +129,94 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             )
         if render_mode == "human" and num_envs != 1:
             raise ValueError("render_mode 'human' is for one environment: the console shows one")
+        self.task = task(**options)
+        limit = self.task.max_episode_steps if max_episode_steps is None else max_episode_steps
+        self.max_episode_steps = whole("max_episode_steps", limit, -1)
         self.num_envs = num_envs
         self.autoreset_mode = checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        self.single_observation_space = observations
-        self.single_action_space = actions
-        self.observation_space = batch_space(observations, num_envs)
-        self.action_space = batch_space(actions, num_envs)
         self._first = 0 if split == "train" else TEST_ROOMS
         self._options: Info = {
-            "set": settings or {},
-            "disable": list(disabled),
+            "set": {**self.task.settings, **named("set", set, '{"robot/lrf.update_rate": 10}')},
+            "disable": [*self.task.disable, *texts("disable", disable)],
             "noise": noise,
             "randomize": randomize or {},
         }
-        scene = self._scene(self._first)
-        self._scenes = [scene] * num_envs
-        self._engine = Engine(
-            type(self).__name__,
-            text=self._text(scene),
-            worlds=num_envs,
-            threads=threads,
-            **self._options,
-        )
+        self._begin_spaces()
+        self._begin_engine(threads)
         self._console: Console | None = None
-        self._places = self._engine.observe("pose.pos")
-        self._turned = self._engine.observe("pose.orientation")
         # Pictures are observed when they are first wanted: Gymnasium makes an environment to look
         # at its spaces before it forks, and after a picture none can be drawn in a fork.
         self._actions = np.zeros(num_envs, int)
         self._over = np.ones(num_envs, bool)  # wait for a reset
         self._unbegun = np.ones(num_envs, bool)  # have waited since they were made
+        self.task.setup()
 
-    # ---- What a task says.
+    def _begin_spaces(self) -> None:
+        observed = getattr(self.task, "observation_space", None)
+        if not isinstance(observed, spaces.Space):
+            raise TypeError(
+                f"{type(self.task).__name__}.observation_space is a space of Gymnasium, not {shown(observed)}"
+            )
+        done = self.task.action_space
+        if not isinstance(done, (spaces.Box, spaces.Discrete, spaces.MultiDiscrete)):
+            raise TypeError(
+                f"{type(self.task).__name__}.action_space is a Box, Discrete or MultiDiscrete, not {shown(done)}"
+            )
+        self.single_observation_space = observed
+        self.single_action_space = done
+        self.observation_space = batch_space(observed, self.num_envs)
+        self.action_space = batch_space(done, self.num_envs)
+
+    def _begin_engine(self, threads: int) -> None:
+        """And the scene that all environments have until their first episode."""
+        self._file = self._world_file()
+        self._fixed = type(self.task).scene is Task.scene and self.task.world is not None
+        scene = self._scene(self._first)
+        self._engine = Engine(
+            self._file or type(self.task).__name__,
+            text=self._text(scene),
+            worlds=self.num_envs,
+            threads=threads,
+            allow_absolute=self._file is None,  # a text of this program, with files that it chose
+            **self._options,
+        )
+        seconds = self.task.action_seconds
+        self._steps = round(seconds / self._engine.dt)
+        if self._steps < 1 or abs(self._steps * self._engine.dt - seconds) > 1e-9:
+            raise ValueError(
+                f"{type(self.task).__name__}.action_seconds is {shown(seconds)}: it must be a multiple "
+                f"of the world's step, {self._engine.dt:g} s"
+            )
+        self._scenes = [scene] * self.num_envs
+        self.task.engine, self.task.num_envs = self._engine, self.num_envs
+        self.task.scenes = self._scenes
+
+    def _world_file(self) -> str | None:
+        """Of a task whose world is a file, or has a name."""
+        world = self.task.world
+        if world is None or isinstance(world, World):
+            return None
+        if not isinstance(world, (str, os.PathLike)):
+            raise TypeError(
+                f"{type(self.task).__name__}.world is a file, the name of a world or a World, not {shown(world)}"
+            )
+        with Engine(world, **self._options) as engine:
+            return engine.files_read[0]
 
     def _scene(self, number: int) -> Scene:
-        """The scene of that number."""
-        raise NotImplementedError
-
-    def _begun(self, indices: NDArray[np.intp]) -> None:
-        """New episodes have begun in these environments."""
-
-    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        """(environments, robots, (m/s, rad/s))"""
-        raise NotImplementedError
-
-    def _outcome(self) -> Outcome:
-        """Rewards, who has succeeded, who has failed."""
-        raise NotImplementedError
-
-    def _observe(self) -> NDArray[Any]:
-        raise NotImplementedError
+        if self._fixed:
+            text = Path(self._file).read_text(encoding="utf-8") if self._file else self.task.world
+            return Scene(number, str(text))
+        scene = self.task.scene(number)
+        if isinstance(scene, Scene):
+            return scene
+        if not isinstance(scene, (str, World)):
+            raise TypeError(
+                f"{type(self.task).__name__}.scene() gives a World, a text or a Scene, not {shown(scene)}"
+            )
+        return Scene(number, str(scene))
 
     # ---- Gymnasium's interface.
 
@@ -190,13 +235,14 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         for i in begin:
             if seeds[i] is not None:
                 self._generators[i] = np.random.default_rng(seeds[i])
-        self._begin(begin)
-        return self._observe(), {}
+        info: Info = {}
+        self._begin(begin, info)
+        return self._observe(), info
 
     def step(
         self, actions: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
-        """One action of 0.1 s in every environment."""
+        """One action in every environment."""
         return self._act(checked_actions(actions, self.action_space))
 
     def _act(
@@ -206,37 +252,88 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             self._check_begun(range(self.num_envs), "the first step()")
         elif not hasattr(self, "_generators"):
             raise gymnasium.error.ResetNeeded("call reset() before the first step()")
+        info: Info = {}
         begun = None  # these show their beginning: their first action is the next one
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
             begun = self._over.copy()
-            self._begin(np.flatnonzero(begun))
+            self._begin(np.flatnonzero(begun), info)
         commands = self._commands(actions)
         if begun is not None:
             commands[begun] = np.nan
-        self._engine.step(commands, STEPS, worlds=None if begun is None else ~begun)
+        self._engine.step(commands, self._steps, worlds=None if begun is None else ~begun)
         if self._console:
-            self._console.step(commands[0])
+            self._console.step(commands[0], self._steps)
         self._actions += 1
         rewards, success, failure = self._outcome()
         if begun is not None:
             rewards[begun], success[begun], failure[begun] = 0.0, False, False
             self._actions[begun] = 0
         terminated = success | failure
-        truncated = (self._actions >= self.most_actions) & ~terminated
+        late = self._actions >= self.max_episode_steps
+        truncated = late & ~terminated if self.max_episode_steps >= 0 else np.zeros_like(late)
         self._over = terminated | truncated
-        info: Info = {"success": success, "collision": failure}
+        acted = np.ones(self.num_envs, bool) if begun is None else ~begun
+        info |= {"success": success, "_success": acted, "collision": failure, "_collision": acted}
         observations = self._observe()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             observations = self._begin_at_once(observations, info)
         return observations, rewards, terminated, truncated, info
 
-    def _begin_at_once(self, observations: NDArray[Any], info: Info) -> NDArray[Any]:
+    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
+        commands = np.array(self.task.commands(actions), np.float64)
+        if commands.ndim != 3 or len(commands) != self.num_envs:
+            raise ValueError(
+                f"{type(self.task).__name__}.commands() gives the shape {commands.shape}, not "
+                f"({self.num_envs}, driven robots, 2 or 3)"
+            )
+        return commands
+
+    def _outcome(self) -> Outcome:
+        rewards, success, failure = self.task.outcome()
+        outcome = Outcome(
+            np.asarray(rewards, np.float64), np.asarray(success, bool), np.asarray(failure, bool)
+        )
+        for name, values in zip(Outcome._fields, outcome):
+            if values.shape != (self.num_envs,):
+                raise ValueError(
+                    f"{type(self.task).__name__}.outcome() gives {name} of the shape {values.shape}, "
+                    f"not {(self.num_envs,)}"
+                )
+        return outcome
+
+    def _observe(self) -> Any:
+        observed = self.task.observe()
+        if not isinstance(self.observation_space, spaces.Dict):
+            return self._checked_observation("", observed, self.observation_space)
+        names = list(self.observation_space)
+        if not isinstance(observed, Mapping) or sorted(observed) != sorted(names):
+            raise ValueError(
+                f"{type(self.task).__name__}.observe() gives a dict of {names}, not {shown(observed)}"
+            )
+        return {
+            name: self._checked_observation(f"[{name!r}]", observed[name], space)
+            for name, space in self.observation_space.items()
+        }
+
+    def _checked_observation(self, which: str, observed: Any, space: spaces.Space[Any]) -> Any:
+        values = np.asarray(observed, space.dtype)
+        if values.shape != space.shape:
+            raise ValueError(
+                f"{type(self.task).__name__}.observe(){which} gives the shape {values.shape}; "
+                f"observation_space asks for {space.shape}"
+            )
+        # A view of the engine's memory would change with the next action.
+        return values if values.flags.writeable else values.copy()
+
+    def _begin_at_once(self, observations: Any, info: Info) -> Any:
         info["final_obs"] = np.full(self.num_envs, None, object)
-        for i in np.flatnonzero(self._over):
-            info["final_obs"][i] = observations[i]
+        for i in np.flatnonzero(self._over).tolist():
+            info["final_obs"][i] = row_of(observations, i)
+        over = self._over.copy()
         info["final_info"] = {name: info[name].copy() for name in ("success", "collision")}
-        info["_final_obs"] = info["_final_info"] = self._over.copy()
-        self._begin(np.flatnonzero(self._over))
+        info["final_info"] |= {"_success": over, "_collision": over}
+        info["_final_obs"] = info["_final_info"] = over
+        self._begin(np.flatnonzero(self._over), info)
         return self._observe()
 
     def save(self, indices: int | Sequence[int] | NDArray[Any] | None = None) -> SavedEpisodes:
@@ -321,8 +418,9 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     def _rows(self) -> dict[str, NDArray[Any]]:
         """What this class and the task keep of the episodes; the engine's arrays are its own."""
         return {
-            name: value
-            for name, value in vars(self).items()
+            f"{type(keeper).__name__}.{name}": value
+            for keeper in (self, self.task)
+            for name, value in vars(keeper).items()
             if isinstance(value, np.ndarray)
             and value.flags.writeable
             and value.shape[:1] == (self.num_envs,)
@@ -376,84 +474,106 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         for i, episode in zip(into, episodes):
             self._engine.restore(episode.world, i)
 
-    def _begin(self, indices: NDArray[np.intp]) -> None:
+    def _begin(self, indices: NDArray[np.intp], info: Info) -> None:
         seeds = []
         for i in indices:
             draw = self._generators[i].integers
-            self._scenes[i] = self._scene(self._first + int(draw(TEST_ROOMS)))
+            number = self._first + int(draw(TEST_ROOMS))
+            scene = self._scenes[i]
+            self._scenes[i] = replace(scene, number=number) if self._fixed else self._scene(number)
             seeds.append(int(draw(2**31)))
         texts = [self._text(self._scenes[i]) for i in indices]
-        self._engine.reset(indices, seed=seeds, text=texts)
+        self._engine.reset(indices, seed=seeds, text=None if self._fixed else texts)
         self._actions[indices] = 0
         self._over[indices] = False
         self._unbegun[indices] = False
-        self._begun(indices)
+        self.task.begin(indices)
+        self._tell_drawn(indices, info)
         if self.render_mode == "human":
             self._show(texts[0], seeds[0])
+
+    def _tell_drawn(self, indices: NDArray[np.intp], info: Info) -> None:
+        """What randomize drew for the episodes that begin; NaN in the rows of the others."""
+        if not self._options["randomize"]:
+            return
+        info["_drawn"] = np.zeros(self.num_envs, bool)
+        info["_drawn"][indices] = True
+        info["drawn"] = {}
+        for i in indices:
+            for target, value in self._engine.drawn(int(i)).items():
+                values = info["drawn"].setdefault(target, np.full(self.num_envs, np.nan))
+                values[i] = value
 
     def _show(self, text: str, seed: int) -> None:
         from .console import Console
 
         if self._console is None:
             self._console = Console()
-        self._console.begin(text, seed, self._options, self._engine.robots)
+        self._console.begin(self._file, text, seed, self._options, self._engine.robots)
 
     def _text(self, scene: Scene) -> str:
         return scene.seen_from_above() if self.render_mode == "rgb_array" else scene.sdf
 
-    def _headings(self, robot: int = 0) -> NDArray[np.float64]:
-        w, x, y, z = self._turned[:, robot].T
-        heading: NDArray[np.float64] = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        return heading
+
+def row_of(values: Any, i: int) -> Any:
+    """Of one environment, of arrays with a row for each."""
+    if isinstance(values, dict):
+        return {name: row_of(value, i) for name, value in values.items()}
+    return values[i]
 
 
 class TaskEnv(MadeAnew, gymnasium.Env):
-    """One episode of a task at a time."""
+    """One episode of a task at a time: `TaskVectorEnv` for one environment. options: its options.
+
+    When `gymnasium.make` has created it, Gymnasium's ``TimeLimit`` counts the actions, and
+    ``max_episode_steps`` is `make`'s.
+    """
 
     metadata: Info = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
-    task: type[TaskVectorEnv]
 
     def __init__(
-        self, render_mode: Literal["rgb_array", "human"] | None = None, **options: Any
+        self,
+        task: type[Task],
+        render_mode: Literal["rgb_array", "human"] | None = None,
+        **options: Any,
     ) -> None:
         if several := {"num_envs", "autoreset_mode"} & options.keys():
             raise TypeError(f"{min(several)} is for gymnasium.make_vec(): this is one environment")
-        self._one = self.task(
-            num_envs=1, autoreset_mode=AutoresetMode.DISABLED, render_mode=render_mode, **options
+        self._one = TaskVectorEnv(
+            task, autoreset_mode=AutoresetMode.DISABLED, render_mode=render_mode, **options
         )
         self.observation_space = self._one.single_observation_space
         self.action_space = self._one.single_action_space
         self.render_mode = render_mode
 
-    def reset(
-        self, *, seed: int | None = None, options: Info | None = None
-    ) -> tuple[NDArray[Any], Info]:
+    @property
+    def task(self) -> Task:
+        return self._one.task
+
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Any, Info]:
         check_options(options)
         if seed is not None:
             seed = whole("seed", seed, 0, MOST_SEED)
         super().reset(seed=seed)
-        observations, _ = self._one.reset(seed=seed)
-        return observations[0], {}
+        observations, info = self._one.reset(seed=seed)
+        return row_of(observations, 0), _of_one(info)
 
-    def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, Info]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, Info]:
         one = checked_actions(action, self.action_space)
         observations, rewards, terminated, truncated, info = self._one._act(one[None])
-        return (
-            observations[0],
-            float(rewards[0]),
-            bool(terminated[0]),
-            bool(truncated[0]),
-            {name: bool(values[0]) for name, values in info.items()},
-        )
+        late = bool(truncated[0]) and self.spec is None  # else TimeLimit counts
+        return row_of(observations, 0), float(rewards[0]), bool(terminated[0]), late, _of_one(info)
 
     def save(self) -> SavedEpisodes:
-        """The episode as it stands: `TaskVectorEnv.save`."""
+        """The episode as it stands: `TaskVectorEnv.save`. Gymnasium's ``TimeLimit`` is not part of
+        it.
+        """
         return self._one.save()
 
-    def restore(self, saved: SavedEpisodes) -> tuple[NDArray[Any], Info]:
+    def restore(self, saved: SavedEpisodes) -> tuple[Any, Info]:
         """Makes the episode what it was. Returns the observation."""
         observations, _ = self._one.restore(saved, 0)
-        return observations[0], {}
+        return row_of(observations, 0), {}
 
     def render(self) -> NDArray[np.uint8] | None:
         frames = self._one.render()
@@ -468,52 +588,13 @@ class TaskEnv(MadeAnew, gymnasium.Env):
         self._one.close()
 
 
-SPEED_M_S = 0.5
-TURN_RAD_S = 1.0
-RANGE_M = 8.0
-
-
-def drive_commands(actions: NDArray[Any]) -> NDArray[np.float64]:
-    """Actions in [-1, 1]: the speed ahead, from 0 to 0.5 m/s, and the turn rate, 1 rad/s at 1."""
-    commands = clipped(np.asarray(actions, np.float64).reshape(-1, 1, 2), -1.0, 1.0)
-    commands[..., 0] += 1.0
-    commands *= (0.5 * SPEED_M_S, TURN_RAD_S)
-    return commands
-
-
-def drive_rewards(
-    progress: NDArray[np.float64], success: NDArray[np.bool_], collision: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Of a step towards a goal: progress in m, + 5 for success, - 5 for a collision, - 0.01."""
-    rewards: NDArray[np.float64] = progress + 5.0 * success - 5.0 * collision - 0.01
-    return rewards
-
-
-def seen(ranges: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A scan as a network likes it: divided by 8 m and cut at 1; what is nearer than the device can
-    measure is 0.
-    """
-    return clipped(ranges * np.float32(1.0 / RANGE_M), 0.0, 1.0)
-
-
-def clipped(values: NDArray[Any], low: Any, high: Any) -> NDArray[Any]:
-    """np.clip, in a third of its time with few values."""
-    result: NDArray[Any] = np.minimum(np.maximum(values, low), high)
-    return result
-
-
-def checked_beams(beams: int) -> int:
-    return whole("beams", beams, 2, 1024)
-
-
-def checked_actions(actions: Any, space: spaces.Space[Any]) -> NDArray[np.float64]:
-    """Finite numbers in the space's shape. Raises TypeError and ValueError."""
-    given = array(f"actions are numbers of shape {space.shape}", actions)
-    if given.shape != space.shape:
-        raise ValueError(f"actions have the shape {space.shape}, not {given.shape}")
-    if not np.isfinite(given).all():
-        raise ValueError(f"actions are finite numbers, not {shown(actions)}")
-    return given
+def _of_one(info: Info) -> Info:
+    """The info of the only environment, without Gymnasium's masks."""
+    return {
+        name: _of_one(values) if isinstance(values, dict) else values[0].item()
+        for name, values in info.items()
+        if not name.startswith("_")
+    }
 
 
 def checked_mode(mode: Any) -> AutoresetMode:
@@ -528,6 +609,3 @@ def check_options(options: Any) -> None:
     """Of a reset. Raises TypeError."""
     if not isinstance(options, (dict, type(None))):
         raise TypeError(f"options is a dict, not {shown(options)}")
-
-
-DRIVE = spaces.Box(-1.0, 1.0, (2,), np.float32)
