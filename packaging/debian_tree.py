@@ -1,6 +1,7 @@
 """What Debian's package holds besides an installation: debian_tree.py FOLDER MAINTAINER.
 
-The changelog is CHANGELOG.md's, its date that of SOURCE_DATE_EPOCH; Python finds the client by a .pth file.
+The changelog is CHANGELOG.md's, its date that of SOURCE_DATE_EPOCH; Python finds the client by a
+.pth file.
 """
 
 import gzip

@@ -6,10 +6,10 @@
 
 Together they are one package: `ruedo` is the prefix of an installation (bin, lib, include, share)
 and the Python client at once, so that the program, importer, worlds, C++ package and jar are found
-by the paths between them. auditwheel copies the shared libraries that a bare Debian 12 does not have into
-ruedo.libs. The module that runs a world in a Python process is there for the build's own Python
-and, where the headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on. Twice the
-same build gives twice the same bytes.
+by the paths between them. auditwheel copies the shared libraries that a bare Debian 12 does not
+have into ruedo.libs. The module that runs a world in a Python process is there for the build's own
+Python and, where the headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on.
+Twice the same build gives twice the same bytes.
 """
 
 import base64
