@@ -1,6 +1,9 @@
 # The Debian package, by `cpack -G DEB` in the build folder: what `cmake --install` puts into /usr, with man pages, completion and what
 # else Debian requires.
-install(FILES ${PROJECT_SOURCE_DIR}/packaging/ruedo.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
+set(completion ${PROJECT_SOURCE_DIR}/packaging/completion)
+install(FILES ${completion}/ruedo.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
+install(FILES ${completion}/_ruedo DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+install(FILES ${completion}/ruedo.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 # The pages are made by the target man-pages, which a release builds: it starts the program twice for each command.
 set(pages ${PROJECT_BINARY_DIR}/man1)
 add_custom_command(OUTPUT ${pages}/ruedo.1.gz

@@ -38,12 +38,24 @@ std::string joined(const std::vector<std::string>& words) {
 
 }  // namespace
 
+std::vector<std::string> world_names() {
+  std::set<std::string> known;
+  std::error_code error;
+  for (const fs::path& folder : folders()) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      const std::string extension = entry.path().extension().string();
+      if (std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings))
+        known.insert(entry.path().stem().string());
+    }
+  }
+  return {known.begin(), known.end()};
+}
+
 std::string world_file(const std::string& name) {
   std::error_code error;
   if (fs::exists(name, error) || error) return name;  // an error is for who opens it to say
   if (name.empty() || name.find('/') != std::string::npos || fs::path(name).has_extension())
     throw InputError({name, 0}, "no such file");
-  std::set<std::string> known;
   std::vector<std::string> searched;
   for (const fs::path& folder : folders()) {
     searched.push_back(folder.string());
@@ -51,19 +63,14 @@ std::string world_file(const std::string& name) {
       const fs::path file = folder / (name + ending);
       if (fs::is_regular_file(file, error)) return file.string();
     }
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-      const std::string extension = entry.path().extension().string();
-      if (std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings))
-        known.insert(entry.path().stem().string());
-    }
   }
   if (searched.empty())
     throw InputError({name, 0},
                      "no such file, and no world of that name: Ruedo's own worlds lie neither "
                      "beside this program nor where it was built");
   throw InputError({name, 0}, "no such file, and no world of that name; there are " +
-                                  joined({known.begin(), known.end()}) + " (searched in " +
-                                  joined(searched) + ")");
+                                  joined(world_names()) + " (searched in " + joined(searched) +
+                                  ")");
 }
 
 }  // namespace ruedo::world

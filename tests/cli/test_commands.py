@@ -83,6 +83,46 @@ def test_the_version_for_scripts():
     assert told["console"] is True and told["ros2"] in (True, False)
 
 
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["=ru"], ["run"]),
+        (["run", "=ar"], ["arena", " files"]),
+        (["run", "arena", "--disable", "=p3at/ca"], ["p3at/camera"]),
+        (["run", "arena", "--ros2-stamped", "="], ["on", "off"]),
+        (["run", "arena", "--ros2-sta"], None),
+        (["run", "arena", "=--ros2-sta"], ["--ros2-stamped"]),
+        (["regress", "arena", "--fault", "=p3at/lrf:fr"], ["p3at/lrf:freeze@"]),
+        (["run", "arena", "--record", "="], [" files"]),
+        (["=--vers"], ["--version"]),
+        (["nonsense", "="], [" files"]),
+    ],
+)
+def test_completion(words, found):
+    done = ruedo("complete", "--", *words)
+    if found is None:
+        assert done.returncode == 2 and "has to begin with =" in done.stderr
+    else:
+        assert done.stdout.splitlines() == found, done
+    assert "complete" not in ruedo("--help").stdout
+
+
+def test_bash_completes(tmp_path):
+    """The words of a line; worlds beside files."""
+    (tmp_path / "arch.sdf").touch()
+    script = (
+        f"PATH={os.path.dirname(RUEDO)}:$PATH; . {WORLDS.parent}/packaging/completion/ruedo.bash; "
+        "COMP_WORDS=(ruedo run ar) COMP_CWORD=2; _ruedo; echo ${COMPREPLY[@]}; "
+        "COMP_WORDS=(ruedo run arena --disable '') COMP_CWORD=4; _ruedo; echo ${COMPREPLY[@]}"
+    )
+    done = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, timeout=PATIENCE
+    )
+    first, second = done.stdout.splitlines()
+    assert first.split() == ["arena", "arch.sdf"]
+    assert {"p3at/lrf", "p3at/camera"} <= set(second.split()), done
+
+
 def test_no_route_is_one_line_with_its_cure():
     result = subprocess.run(
         ["unshare", "-rn", RUEDO, "run", ARENA, "--lcm", url(7800)],

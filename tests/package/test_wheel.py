@@ -77,9 +77,7 @@ with ruedo.connect(sys.argv[1], timeout=30) as sim:
 """
     words = [venv / "bin/ruedo", "run", "arena", "--disable", "p3at/camera", "--rate", "20"]
     url = f"unix://{tmp_path}/bus"
-    server = subprocess.Popen(
-        [*words, "--lcm", url, "--quiet"], stdout=subprocess.DEVNULL, cwd="/"
-    )
+    server = subprocess.Popen([*words, "--lcm", url, "--quiet"], stdout=subprocess.DEVNULL, cwd="/")
     try:
         said = run(client / "bin/python", "-c", program, url)
     finally:

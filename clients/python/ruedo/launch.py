@@ -110,13 +110,9 @@ def launch(
     try:
         until = time.monotonic() + timeout
         server.await_port(url, until)
-        return Simulation(
-            url,
-            name,
-            max(until - time.monotonic(), 1.0),
-            server,
-            view=f"http://127.0.0.1:{port}/" if port else None,
-        )
+        left = max(until - time.monotonic(), 1.0)
+        page = f"http://127.0.0.1:{port}/" if port else None
+        return Simulation(url, name, left, server, view=page)
     except NoServer as error:  # with what the server said, when it ended
         server.end()
         raise LaunchError(str(error)) from None
