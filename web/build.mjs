@@ -6,10 +6,14 @@ import { build } from "esbuild";
 
 const [output] = process.argv.slice(2);
 // The licences of what is bundled want their notices with it.
-const notices = ["three", "uplot"]
+const notices = [
+  ["three", "LICENSE"],
+  ["uplot", "LICENSE"],
+  ["dockview", "LICENCE.md"],
+]
   .map(
-    (name) =>
-      `${name}\n\n${readFileSync(`node_modules/${name}/LICENSE`, "utf8").trim().replaceAll("*/", "* /")}`,
+    ([name, file]) =>
+      `${name}\n\n${readFileSync(`node_modules/${name}/${file}`, "utf8").trim().replaceAll("*/", "* /")}`,
   )
   .join("\n\n");
 const bundle = await build({

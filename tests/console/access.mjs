@@ -36,7 +36,7 @@ export default async function access({ page, until, check, ready, picture, expec
     for (const name of ["Robot", "Plots", "Channels", "World", "Notes"]) {
       await tab(name);
       await page.evaluate(() => {
-        for (const part of document.querySelectorAll("#panel details")) part.open = true;
+        for (const part of document.querySelectorAll(".page details")) part.open = true;
       });
       await note(`${scheme}, ${width} wide, ${name}`);
     }
@@ -98,12 +98,12 @@ export default async function access({ page, until, check, ready, picture, expec
   await page.keyboard.press("ArrowLeft");
   const chosen = () =>
     page.evaluate(() => [window.ruedo.page.now.tab, document.activeElement.textContent].join());
-  check("arrows go from tab to tab", (await chosen()) === "Channels,Channels", await chosen());
+  check("arrows go from tab to tab", (await chosen()) === "Channels,Channels×", await chosen());
   await page.keyboard.press("End");
   await page.keyboard.press("ArrowRight");
   check(
     "and around",
-    (await chosen()) === "Robot,Robot" &&
+    (await chosen()) === "Robot,Robot×" &&
       (await page.evaluate(() => document.getElementById("readout").textContent === "")),
     await chosen(),
   );
@@ -162,13 +162,13 @@ export default async function access({ page, until, check, ready, picture, expec
       robot: 0,
     });
   });
-  await page.locator("#find").fill("777");
+  await page.locator(".find").fill("777");
   await page.keyboard.press("Enter");
   check(
     "a robot among many is found by its name",
     await page.evaluate(
       () =>
-        window.ruedo.page.now.robot === 777 && document.getElementById("robots").value === "r777",
+        window.ruedo.page.now.robot === 777 && document.querySelector(".robots").value === "r777",
     ),
   );
   await page.evaluate(() => window.ruedo.page.set({ world: window.was, robot: 0 }));
@@ -208,7 +208,7 @@ export default async function access({ page, until, check, ready, picture, expec
     "what is chosen can be seen in forced colours",
     await page.evaluate(
       () =>
-        getComputedStyle(document.querySelector('.tabs [aria-selected="true"]'))
+        getComputedStyle(document.querySelector('.dv-tab[aria-selected="true"]'))
           .borderBottomWidth === "2px" &&
         getComputedStyle(document.querySelector(".chip.on")).borderTopWidth === "2px",
     ),

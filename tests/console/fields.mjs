@@ -29,7 +29,7 @@ export default async function fields({ page, until, check, ready, picture }) {
       event = (type) =>
         new DragEvent(type, { dataTransfer: data, cancelable: true, bubbles: true });
     document.querySelector('[data-field="theta"]').dispatchEvent(event("dragstart"));
-    document.getElementById("tab-Plots").dispatchEvent(event("dragover"));
+    document.querySelector('[data-tab-panel-id="Plots"]').dispatchEvent(event("dragover"));
     document.getElementById("fields").dispatchEvent(event("drop"));
   });
   await until("a drag onto Plots does, too", () => window.ruedo.plots.panes[0].series.length === 2);
@@ -103,7 +103,7 @@ export default async function fields({ page, until, check, ready, picture }) {
       event = (type) =>
         new DragEvent(type, { dataTransfer: data, cancelable: true, bubbles: true });
     document.querySelector('[data-field="v"]').dispatchEvent(event("dragstart"));
-    document.querySelector("#panel .page").dispatchEvent(event("drop"));
+    document.querySelector(".page").dispatchEvent(event("drop"));
   });
   await until(
     "a drop anywhere on the panel plots",

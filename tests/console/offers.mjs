@@ -10,8 +10,8 @@ export default async function offers({ page, given, until, check, picture }) {
     chips = await page.locator(".chip[data-layer]:visible").allInnerTexts();
   if (given.is === "bare") {
     check("no motions are offered where no robot is", !motions && !pad);
-    check("no choice of robots", !(await seen("#robots")) && !(await seen("#find")));
-    check("it says so", /no robot/.test(await page.locator("#page").innerText()));
+    check("no choice of robots", !(await seen(".robots")) && !(await seen(".find")));
+    check("it says so", /no robot/.test(await page.locator(".page").innerText()));
     check("nothing that robots sense", chips.join() === "shapes", chips.join());
     await page.getByRole("tab", { name: "Plots" }).click();
     check("no plots of a robot", (await page.locator(".u-title:visible").count()) === 0);

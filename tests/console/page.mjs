@@ -65,9 +65,7 @@ export default async function looks(tools) {
       await page.waitForTimeout(150);
       const wide = await page.evaluate(() => {
         const outside = [
-          ...document.querySelectorAll(
-            "#bar button, #bar select, .tabs button, .page *, #timeline *",
-          ),
+          ...document.querySelectorAll("#bar button, #bar select, .dv-tab, .page *, #timeline *"),
         ].filter((e) => {
           const box = e.getBoundingClientRect();
           return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1);
@@ -89,7 +87,7 @@ export default async function looks(tools) {
   seen("nothing is wider than a phone");
   const small = await page.evaluate(
     () =>
-      [...document.querySelectorAll("#bar button, .tabs button")]
+      [...document.querySelectorAll("#bar button, .dv-tab")]
         .map((e) => e.getBoundingClientRect())
         .filter((box) => box.width > 0 && Math.min(box.width, box.height) < 34).length,
   );
@@ -110,7 +108,7 @@ export default async function looks(tools) {
     await page.getByRole("tab", { name: "Robot" }).click();
     await page.waitForTimeout(500);
     colours[theme] = await page.evaluate(() =>
-      ["#panel", ".facts dt", ".facts dd", "h2", "#bar", ".pill"].map((selector) => {
+      [".page", ".facts dt", ".facts dd", "h2", "#bar", ".pill"].map((selector) => {
         const element = document.querySelector(selector);
         let behind = element;
         while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)")

@@ -1,19 +1,9 @@
-// Panels beside the scene: their width, what was said, messages and faults by hand, a part of the
-// time line.
+// Panels beside the scene: where they are, further views and cameras, what was said, messages and
+// faults by hand, a part of the time line.
 export default async function panels({ page, until, check, ready, picture }) {
   await page.setViewportSize({ width: 1100, height: 600 });
   await ready();
-  const width = () => page.evaluate(() => document.getElementById("panel").clientWidth);
-  const before = await width(),
-    edge = await page.locator("#splitter").boundingBox();
-  await page.mouse.move(edge.x + edge.width / 2, 200);
-  await page.mouse.down();
-  await page.mouse.move(edge.x + edge.width / 2 - 100, 200, { steps: 3 });
-  await page.mouse.up();
-  check("the panel is dragged wider", Math.abs((await width()) - before - 100) < 3, await width());
-  await page.locator("#splitter").focus();
-  await page.keyboard.press("ArrowRight");
-  check("and moved by keys", Math.abs((await width()) - before - 80) < 3, await width());
+  await arrange({ page, until, check, picture });
 
   // ---- a message by hand
   await page.getByRole("tab", { name: "Channels" }).click();
@@ -75,4 +65,131 @@ export default async function panels({ page, until, check, ready, picture }) {
   });
   await page.locator("#events").dblclick();
   await until("and a double click shows everything", () => window.ruedo.page.now.span === null);
+}
+
+// Panels are resized, moved beside each other, closed and opened again; further views are added.
+async function arrange({ page, until, check, picture }) {
+  const box = (selector) => page.locator(selector).boundingBox(),
+    width = async () => (await box(".page")).width;
+  const before = await width(),
+    edge = page.getByRole("separator", { name: "edge between panels" }),
+    { x, width: thick } = await edge.boundingBox();
+  await page.mouse.move(x + thick / 2, 200);
+  await page.mouse.down();
+  await page.mouse.move(x + thick / 2 - 100, 200, { steps: 3 });
+  await page.mouse.up();
+  check("the panel is dragged wider", Math.abs((await width()) - before - 100) < 3, await width());
+  await edge.focus();
+  await page.keyboard.press("ArrowRight");
+  check("and moved by keys", Math.abs((await width()) - before - 80) < 3, await width());
+
+  const view = await box("#view"),
+    tab = (name) => page.getByRole("tab", { name });
+  await tab("Plots").dragTo(page.locator("#canvas"), {
+    targetPosition: { x: view.width / 2, y: view.height - 20 },
+  });
+  await until("a page is dragged below the view, and both pages are seen", () => {
+    const { shown } = window.ruedo.page.now;
+    return shown.has("Plots") && shown.has("Robot");
+  });
+  await until("(and drawn)", () => document.querySelectorAll(".plot canvas").length === 3);
+  const plots = await page.locator(".plot").first().boundingBox(),
+    left = await box("#view");
+  check(
+    "it is below what is left of the view",
+    plots.y > left.y + left.height - 1 && left.height < view.height - 100 && plots.x < 100,
+    JSON.stringify([plots, left]),
+  );
+  check(
+    "the view fills its part",
+    await page.evaluate(() => {
+      const { aspect } = window.ruedo.stage.view.camera,
+        { clientWidth, clientHeight } = document.getElementById("view");
+      return Math.abs(aspect - clientWidth / clientHeight) < 0.02;
+    }),
+  );
+  await picture("arranged");
+
+  const menu = (name) => page.locator("#panels").getByText(name, { exact: true }).click();
+  await page.locator("#open-panels").click();
+  await menu("Notes");
+  check("a page is closed", (await tab("Notes").count()) === 0);
+  await menu("Notes");
+  check("and opened", (await tab("Notes").count()) === 1);
+  await menu("Add a 3-D view");
+  await until("another 3-D view is drawn", () => {
+    const canvas = document.querySelector(".scene-panel canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return new Set(data.filter((_, i) => i % 4 === 0)).size > 20;
+  });
+  const place = await page.evaluate(() => window.ruedo.stage.view.at);
+  const other = await box(".scene-panel canvas");
+  await page.mouse.move(other.x + other.width / 2, other.y + other.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(other.x + other.width / 2 + 80, other.y + other.height / 2, { steps: 4 });
+  await page.mouse.up();
+  await until(
+    "it is turned by itself",
+    (main) => {
+      const { panels } = window.ruedo.dock.kept,
+        at = Object.values(panels).find(({ contentComponent: kind }) => kind === "scene").params
+          ?.at;
+      return at && Math.hypot(at[0] - main[0], at[1] - main[1]) > 0.3;
+    },
+    place,
+  );
+  const same = await page.evaluate(() => window.ruedo.stage.view.at);
+  check(
+    "and the first view stays",
+    same.every((value, i) => Math.abs(value - place[i]) < 1e-6),
+    JSON.stringify([same, place]),
+  );
+  await page.locator("#open-panels").click();
+  await page.getByLabel("add a camera").selectOption("p3at/camera");
+  await page.keyboard.press("Escape");
+  await until("a camera has a panel", () => {
+    const canvas = document.querySelector(".camera-panel canvas");
+    return canvas?.checkVisibility() && canvas.width > 100;
+  });
+  await picture("views");
+
+  await page.reload();
+  const again = (what) =>
+    until(what, () => {
+      const { shown } = window.ruedo?.page.now ?? {};
+      return (
+        shown?.has("Plots") &&
+        shown.has("Notes") &&
+        document.querySelector(".scene-panel canvas")?.width > 100 &&
+        document.querySelector(".camera-panel canvas")?.checkVisibility()
+      );
+    });
+  await again("all is there again after a reload");
+  const notes = tab("Notes");
+  await tab("World").click();
+  await page.locator("#link").click();
+  await until("(there is a link)", () => location.hash.includes("layout"));
+  await notes.click();
+  await page.evaluate(() => localStorage.clear());
+  await page.reload();
+  await until(
+    "a link leads to the same arrangement",
+    () =>
+      window.ruedo?.page.now.shown.has("World") &&
+      document.querySelector(".scene-panel canvas")?.width > 100 &&
+      document.querySelectorAll(".camera-panel").length === 1,
+  );
+  await page.locator("#open-panels").click();
+  await menu("Usual layout");
+  await until(
+    "and in its usual place when that is wanted",
+    () =>
+      !document.querySelector(".scene-panel, .camera-panel") &&
+      document.querySelectorAll('[role="tab"]').length === 6 &&
+      window.ruedo.page.now.shown.size === 1,
+  );
+  check(
+    "one view is drawn then",
+    (await page.evaluate(() => window.ruedo.stage.further.size)) === 0,
+  );
 }

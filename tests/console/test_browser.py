@@ -396,8 +396,15 @@ def test_what_goes_wrong_is_said(tmp_path):
 
 
 def test_panels_do_more(tmp_path):
-    with running("--disable", "p3at/camera") as process:
-        browse(process.url, tmp_path, "panels")
+    with running() as process:
+        seen = browse(process.url, tmp_path, "panels")
+    assert {
+        "a page is dragged below the view, and both pages are seen",
+        "another 3-D view is drawn",
+        "a camera has a panel",
+        "all is there again after a reload",
+        "a link leads to the same arrangement",
+    } <= set(seen)
 
 
 @pytest.mark.parametrize("what", ["bare", "log", "watched", "hall"])

@@ -9,9 +9,18 @@ declare global {
   } // the page's parts, for tests and the curious
 }
 try {
-  const { model, scene, editing, panel, robot, arrivals } = new App(),
+  const { model, scene, editing, panel, robot, arrivals, arranged } = new App(),
     choose = (at: number) => chooseRobot(model.page, at);
-  window.ruedo = { ...model, ...scene, ...editing, ...panel, ...robot, ...arrivals, choose };
+  window.ruedo = {
+    ...model,
+    ...scene,
+    ...editing,
+    ...panel,
+    ...robot,
+    ...arrivals,
+    ...arranged,
+    choose,
+  };
 } catch (error) {
   const notice = document.getElementById("notice")!;
   notice.hidden = false;

@@ -24,7 +24,7 @@ const pageWith = (more: Partial<PageState> = {}): Page =>
     past: null,
     kept: { begin: 0, end: 0 },
     layers: new Set(),
-    tab: "Robot",
+    shown: new Set(["Robot"]),
     panel: true,
     tool: "select",
     ...more,
@@ -134,9 +134,9 @@ describe("what the link is asked for", () => {
     expect(last()).toEqual(["a/motion", "ruedo/info", "ruedo/markers"]);
     page.set({ complete: false });
     expect(last()).toEqual(["a/motion", "ruedo/info"]);
-    page.set({ tab: "Channels" });
+    page.set({ shown: new Set(["Robot", "Channels"]) });
     expect(watchTraffic).toHaveBeenLastCalledWith(true);
-    page.set({ panel: false });
+    page.set({ shown: new Set() });
     expect(watchTraffic).toHaveBeenLastCalledWith(false);
   });
 });

@@ -78,6 +78,7 @@ function state(more: Partial<PageState> = {}): PageState {
     edits: { undo: null, redo: null, changes: 0 },
     saved: 0,
     tab: "World",
+    shown: new Set(["World"]),
     panel: true,
     ...more,
   };
@@ -188,9 +189,9 @@ describe("wanted channels", () => {
     expect(wanted({ layers: new Set(["sonar", "trail", "contacts", "frames"]) })).toEqual(
       of("a", "contact_t", "odometry_t", "pose_t", "sonar_t"),
     );
-    expect(wanted({ tab: "Plots" })).toEqual(of("a", "odometry_t", "pose_t"));
-    expect(wanted({ tab: "Robot" })).toEqual(of("a", ...[...kTypes].sort()));
-    expect(wanted({ tab: "Robot", panel: false })).toEqual(of("a", "odometry_t"));
+    expect(wanted({ shown: new Set(["Plots"]) })).toEqual(of("a", "odometry_t", "pose_t"));
+    expect(wanted({ shown: new Set(["Robot", "Plots"]) })).toEqual(of("a", ...[...kTypes].sort()));
+    expect(wanted({ shown: new Set() })).toEqual(of("a", "odometry_t"));
   });
 
   it("are of all robots while these are few, else of the chosen one", () => {

@@ -19,9 +19,14 @@ export function goToAddress({ page, link }: Model, stage: Stage): void {
   }
 }
 
-export async function copyLink({ page }: Model, stage: Stage, panes: Pane[]): Promise<void> {
+export async function copyLink(
+  { page }: Model,
+  stage: Stage,
+  panes: Pane[],
+  layout: unknown,
+): Promise<void> {
   const { hello, playback, past, world, robot, selected, tab, layers } = page.now,
-    open = { page: tab, off: kLayers.filter((layer) => !layers.has(layer)), panes },
+    open = { page: tab, off: kLayers.filter((layer) => !layers.has(layer)), panes, layout },
     time_s = hello?.mode === "log" ? (playback?.now ?? null) : (past?.now ?? null);
   const name = world?.robots[robot]?.name ?? "";
   location.hash = hashOf({ time_s, camera: stage.view.at, robot: name, selected, open });

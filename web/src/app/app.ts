@@ -7,11 +7,11 @@ import { Bar } from "../ui/bar";
 import { Drive } from "../ui/drive";
 import { fillHelp } from "../ui/help";
 import { listenToKeys } from "../ui/keys";
-import { Layout } from "../ui/layout";
 import { makeLegend } from "../ui/legend";
 import { Notice } from "../ui/notice";
 import { Timeline } from "../ui/timeline";
 import { byId, h, say } from "../widgets/elements";
+import { Arrangement } from "./arrangement";
 import { Arrivals } from "./arrivals";
 import { ChosenRobot } from "./chosen_robot";
 import { Connection } from "./connection";
@@ -32,6 +32,7 @@ export class App {
   readonly panel: PanelView;
   readonly robot: ChosenRobot;
   readonly arrivals: Arrivals;
+  readonly arranged: Arrangement;
   private readonly fallen = new Fallen(this.model.page, this.model.poses);
   private readonly help = byId("help") as HTMLDialogElement;
 
@@ -55,12 +56,15 @@ export class App {
           : "The browser has taken the 3-D graphics away. All else works; waiting for them …",
       );
     this.makeControls();
+    this.arranged = new Arrangement(model, this.scene, this.panel);
     this.makePad();
     this.listen();
     model.wanted.watch();
     const { loading } = this.arrivals,
-      { channels } = this.panel,
-      router = new Router(page, { ...model, ...this.scene, ...this.panel, loading });
+      { channels, inset } = this.panel,
+      { cameras } = this.arranged,
+      views = { ...model, ...this.scene, ...this.panel, cameras: [inset, cameras], loading },
+      router = new Router(page, views);
     void new Connection(model, { loading, world, router, channels, notice }).open();
     requestAnimationFrame((at_ms) => this.frame(at_ms));
   }
@@ -79,7 +83,6 @@ export class App {
       help: () => help.showModal(),
       panel: () => togglePanel(page),
     });
-    new Layout(page);
     makeLegend(byId("legend"), page);
     byId("view").append(scene.measure.readout);
     const timeline = new Timeline(byId("timeline"), page, {

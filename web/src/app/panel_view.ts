@@ -9,12 +9,11 @@ import { FieldPlots } from "../ui/field_plots";
 import { FrameTree } from "../ui/frames";
 import { Inset } from "../ui/inset";
 import { Notes } from "../ui/notes";
-import { Panel } from "../ui/panel";
 import { Publisher } from "../ui/publish";
 import { RobotPages } from "../ui/robot";
+import { RobotChoice } from "../ui/robot_choice";
+import type { Tab } from "../state/page";
 import { byId, h } from "../widgets/elements";
-import { Splitter } from "../ui/splitter";
-import { copyLink } from "./address";
 import type { Editing } from "./editing";
 import type { Model } from "./model";
 import type { SceneView } from "./scene_view";
@@ -25,6 +24,8 @@ export class PanelView {
   readonly channels: ChannelList;
   readonly editPage: EditPage;
   readonly inset: Inset;
+  readonly all: Record<Tab, HTMLElement>; // the pages
+  readonly linkButton = h("button", { id: "link" }, "Copy link");
   private readonly frames: FrameTree;
 
   constructor(
@@ -61,29 +62,16 @@ export class PanelView {
     this.pages.extras.append(this.inset.chooser, this.frames.element, this.faults(model));
     this.editPage.extras.append(
       new Capture(page, scene.stage, scene.canvas).element,
-      h(
-        "div",
-        { class: "row" },
-        h(
-          "button",
-          { id: "link", click: () => void copyLink(model, scene.stage, this.plots.kept) },
-          "Copy link",
-        ),
-      ),
+      h("div", { class: "row" }, this.linkButton),
     );
-    new Panel(
-      byId("panel"),
-      page,
-      {
-        Robot: this.pages.statePage,
-        Plots: h("div", {}, compared.element, this.pages.plotPage, this.plots.element),
-        Channels: h("div", {}, new Publisher(page, publish).element, this.channels.element),
-        World: this.editPage.element,
-        Notes: new Notes(page).element,
-      },
-      (robot) => chooseRobot(page, robot),
-    );
-    new Splitter(byId("panel"));
+    const choice = () => new RobotChoice(page, (robot) => chooseRobot(page, robot)).element;
+    this.all = {
+      Robot: h("div", {}, choice(), this.pages.statePage),
+      Plots: h("div", {}, choice(), compared.element, this.pages.plotPage, this.plots.element),
+      Channels: h("div", {}, new Publisher(page, publish).element, this.channels.element),
+      World: this.editPage.element,
+      Notes: new Notes(page).element,
+    };
     this.connect();
   }
 
@@ -110,7 +98,7 @@ export class PanelView {
       ...plots.channels,
       ...(inset.channel ? [inset.channel] : []),
     ]);
-    plots.takeDrops(byId("panel"));
+    plots.takeDrops(byId("dock"));
     channels.onPlot = (channel, path) => {
       plots.plot(channel, path, false);
       page.set({ tab: "Plots" });

@@ -15,7 +15,6 @@ import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
 import type { FieldPlots } from "../ui/field_plots";
-import type { Inset } from "../ui/inset";
 import type { RobotPages } from "../ui/robot";
 import { decode, fingerprint, typeOf, type TypeName } from "../wire/lcm";
 import type { Session } from "../wire/session";
@@ -46,6 +45,9 @@ export function routesOf(world: World): Map<string, Route> {
   return routes;
 }
 
+// What shows the pictures of single channels.
+type Cameras = readonly { message(channel: string, image: Messages["image_t"]): void }[];
+
 // The source of a robot's message, and the views that show it.
 interface Shown {
   channel: string;
@@ -54,7 +56,7 @@ interface Shown {
   overlay: RobotOverlay | undefined;
   pages: RobotPages | undefined; // for the chosen robot only
   stage: Stage;
-  inset: Inset;
+  cameras: Cameras;
 }
 // Messages are decoded only if a view shows them.
 type Show<Type extends TypeName> = (to: Shown, read: () => Messages[Type]) => void;
@@ -97,12 +99,12 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
   imu_t({ device, pages }, read) {
     if (device) pages?.imu(device, read());
   },
-  image_t({ channel, device, overlay, pages, inset }, read) {
+  image_t({ channel, device, overlay, pages, cameras }, read) {
     const image = read();
     const points =
       device && isDepth(channel, "image_t") ? pointsOfDepth(image, device.fov_horizontal) : null;
     if (points) overlay?.cloud(device!, points, null);
-    inset.message(channel, image);
+    for (const each of cameras) each.message(channel, image);
     pages?.camera(channel.slice(channel.indexOf("/") + 1), image, device?.kind);
   },
   lidar_t({ device, overlay }, read) {
@@ -125,7 +127,7 @@ export interface Views {
   pages: RobotPages;
   channels: ChannelList;
   plots: Pick<FieldPlots, "message">;
-  inset: Inset;
+  cameras: Cameras;
 }
 
 export class Router {
@@ -199,7 +201,7 @@ export class Router {
       overlay: this.views.overlays.of.get(robot),
       pages: index === this.page.now.robot ? this.views.pages : undefined,
       stage: this.views.stage,
-      inset: this.views.inset,
+      cameras: this.views.cameras,
     };
     const read = () => decode(type, bytes);
     const show: Show<Type> | undefined = kShow[type];

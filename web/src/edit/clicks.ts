@@ -56,7 +56,7 @@ export function listenToClicks(
       });
       return;
     }
-    if (page.now.tab === "World" && page.now.controlled && page.now.hello?.mode === "live")
+    if (page.now.shown.has("World") && page.now.controlled && page.now.hello?.mode === "live")
       page.set({ selected: picked.model });
     const robot =
       page.now.world?.robots.findIndex(

@@ -33,7 +33,7 @@ export class Gizmo {
     this.controls.addEventListener("mouseDown", () => this.begun.copy(this.handle.matrix));
     this.controls.addEventListener("objectChange", () => this.preview());
     this.controls.addEventListener("mouseUp", () => void this.commit());
-    page.watch(["selected", "scene", "tool", "tab", "controlled"], () => this.attach());
+    page.watch(["selected", "scene", "tool", "shown", "controlled"], () => this.attach());
     page.watch(["handle"], ({ handle }) => {
       this.controls.setMode(handle);
       stage.touch();
@@ -61,13 +61,13 @@ export class Gizmo {
   }
 
   private attach(): void {
-    const { selected, tool, tab, controlled, hello } = this.page.now,
+    const { selected, tool, shown, controlled, hello } = this.page.now,
       model = this.editor.find(selected);
     const wanted =
       model &&
       !model.path &&
       tool === "select" &&
-      tab === "World" &&
+      shown.has("World") &&
       controlled &&
       hello?.mode === "live";
     if (wanted) {

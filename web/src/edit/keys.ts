@@ -6,8 +6,8 @@ import type { Editor } from "./editor";
 
 export function listenToEditing(page: Page, editor: Editor): void {
   addEventListener("keydown", (event) => {
-    const { tab, hello, controlled, selected } = page.now;
-    if (tab !== "World" || hello?.mode !== "live" || !controlled || dialogIsOpen()) return;
+    const { shown, hello, controlled, selected } = page.now;
+    if (!shown.has("World") || hello?.mode !== "live" || !controlled || dialogIsOpen()) return;
     const key = event.key.toLowerCase(),
       command = event.ctrlKey || event.metaKey,
       typing = isTyping(event.target);

@@ -16,12 +16,12 @@ export class Outline {
     this.helper.visible = false;
     (this.helper.material as THREE.LineBasicMaterial).toneMapped = false;
     stage.scene.add(this.helper);
-    page.watch(["selected", "tab"], () => stage.touch());
+    page.watch(["selected", "shown"], () => stage.touch());
   }
 
   follow(): void {
-    const { selected, tab } = this.page.now,
-      model = tab === "World" ? this.editor.find(selected) : undefined;
+    const { selected, shown } = this.page.now,
+      model = shown.has("World") ? this.editor.find(selected) : undefined;
     if (model) this.box.copy(this.stage.bodies.boxOf(model));
     this.helper.visible = model !== undefined && !this.box.isEmpty();
   }

@@ -7,6 +7,7 @@ import { disposeOf, SceneBuilder } from "./build";
 import { metrePixels } from "./detail";
 import { finishesOf, setFinish } from "./finish";
 import { FrameTimer } from "./frame_timer";
+import { FurtherView } from "./further_view";
 import { Lights } from "./lights";
 import { Picker } from "./picker";
 import { drawnBySoftware, Quality } from "./quality";
@@ -23,6 +24,7 @@ export class Stage {
   frameCost_ms = 0; // of this thread, smoothed
   firstDrawn_ms = 0; // when the world was first drawn, since navigation
   private readonly lights = new Lights();
+  private readonly further = new Set<FurtherView>();
   private readonly fog = new THREE.Fog(0); // begins behind what is looked at
   private timer: FrameTimer | null = null;
   private shadows = true; // what the user wants
@@ -147,6 +149,17 @@ export class Stage {
     this.view.home(shownOf(this.bodies.description));
   }
 
+  // A further view of the scene.
+  addView(): FurtherView {
+    const view = new FurtherView(this.bodies, () => this.touch());
+    this.further.add(view);
+    return view;
+  }
+  removeView(view: FurtherView): void {
+    this.further.delete(view);
+    view.dispose();
+  }
+
   // Shows a model moved by that transform; null: where it is.
   preview(model: ModelDescription | null, by: THREE.Matrix4): void {
     this.bodies.preview(model, by);
@@ -199,6 +212,7 @@ export class Stage {
     this.bodies.advance(at_ms);
     if (overlays()) this.sense();
     this.view.frame();
+    for (const { view } of this.further) view.frame();
     if (!this.renderer || !this.drawsNow(at_ms)) return;
     this.dirty = this.sensed = false;
     const begun = performance.now();
@@ -211,16 +225,27 @@ export class Stage {
   }
 
   private render(renderer: THREE.WebGLRenderer): void {
-    const { camera, controls } = this.view;
+    const { camera, controls } = this.view,
+      { plain } = this.quality.now;
+    if (this.lights.aim(controls.target)) renderer.shadowMap.needsUpdate = true;
+    for (const view of this.further) {
+      this.clear(view.view.reach);
+      view.draw(renderer, this.scene, this.bodies, plain);
+      this.regroup = true;
+    }
     if (this.regroup) {
       const metre_px = metrePixels(renderer.domElement.height, camera.fov);
-      this.bodies.shareOut({ position: camera.position, metre_px }, this.quality.now.plain);
+      this.bodies.shareOut({ position: camera.position, metre_px }, plain);
       this.regroup = false;
     }
-    this.fog.near = Math.max(35, 2 * this.view.reach);
-    this.fog.far = 4 * this.fog.near;
-    if (this.lights.aim(controls.target)) renderer.shadowMap.needsUpdate = true;
+    this.clear(this.view.reach);
     renderer.render(this.scene, camera);
+  }
+
+  // Fog begins behind what is looked at in that distance.
+  private clear(reach_m: number): void {
+    this.fog.near = Math.max(35, 2 * reach_m);
+    this.fog.far = 4 * this.fog.near;
   }
 
   // Whether this frame is to be drawn; applies its quality if so.

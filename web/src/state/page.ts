@@ -67,8 +67,9 @@ export interface PageState {
   snap_m: number; // 0: off
   edits: HistoryState;
   saved: number; // number of changes when the world was last saved
-  tab: Tab;
-  panel: boolean; // whether it is open
+  tab: Tab; // the page that was opened last
+  shown: ReadonlySet<Tab>; // pages that are seen
+  panel: boolean; // whether pages are seen at all
 }
 
 export interface Span {
@@ -115,6 +116,7 @@ export function makePage(): Page {
     edits: { undo: null, redo: null, changes: 0 },
     saved: 0,
     tab: kTabs.find((name) => name === tab) ?? "Robot",
+    shown: new Set<Tab>(),
     panel: innerWidth >= 860 && recall("panel") !== "closed",
   });
 }

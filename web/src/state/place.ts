@@ -5,6 +5,7 @@
 export interface Open {
   page: string;
   off: string[];
+  layout?: unknown; // of the panels
   panes: { xy: boolean; of: [channel: string, path: string][] }[];
 }
 
@@ -44,7 +45,7 @@ export function placeOf(hash: string): Place {
 
 function openOf(text: string | null): Open | null {
   try {
-    const { page, off, panes } = JSON.parse(text ?? "null") as Open;
+    const { page, off, panes, layout } = JSON.parse(text ?? "null") as Open;
     const good =
       typeof page === "string" &&
       off.every((layer) => typeof layer === "string") &&
@@ -52,7 +53,7 @@ function openOf(text: string | null): Open | null {
         ({ xy, of }) =>
           typeof xy === "boolean" && of.every((each) => each.length === 2 && each.every(isText)),
       );
-    return good ? { page, off, panes } : null;
+    return good ? { page, off, panes, ...(layout ? { layout } : {}) } : null;
   } catch {
     return null;
   }

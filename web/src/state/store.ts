@@ -19,10 +19,11 @@ export class Store<State extends object> {
       if (keys.some((key) => changed.includes(key))) call();
   }
 
-  // Calls at once, and whenever one of these values changes.
-  watch(keys: (keyof State)[], call: (state: Readonly<State>) => void): void {
-    const told = () => call(this.values);
-    this.watchers.push({ keys, call: told });
-    told();
+  // Calls at once, and whenever one of these values changes. Returns what ends that.
+  watch(keys: (keyof State)[], call: (state: Readonly<State>) => void): () => void {
+    const watcher = { keys, call: () => call(this.values) };
+    this.watchers.push(watcher);
+    watcher.call();
+    return () => this.watchers.splice(this.watchers.indexOf(watcher), 1);
   }
 }

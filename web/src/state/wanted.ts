@@ -30,7 +30,7 @@ const onTab = (tab: Tab, type: string) =>
 
 // opened: channels that views need in addition.
 export function wantedChannels(state: Readonly<PageState>, opened: Iterable<string>): Set<string> {
-  const { hello, world, complete, robot, layers, tab, panel } = state;
+  const { hello, world, complete, robot, layers, shown: pages } = state;
   const wanted = new Set<string>();
   if (!hello) return wanted;
   wanted.add(hello.info);
@@ -52,7 +52,7 @@ export function wantedChannels(state: Readonly<PageState>, opened: Iterable<stri
     } else if (
       complete &&
       ((shown.has(of) && (drawn.has(type) || (depths && isDepth(name, type)))) ||
-        (of === chosen && panel && onTab(tab, type)))
+        (of === chosen && [...pages].some((tab) => onTab(tab, type))))
     ) {
       wanted.add(name);
     }
@@ -79,20 +79,18 @@ export class Wanted {
 
   // Starts watching, once all views exist.
   watch(): void {
-    this.page.watch(
-      ["hello", "world", "scene", "complete", "robot", "layers", "tab", "panel"],
-      () => this.update(),
+    this.page.watch(["hello", "world", "scene", "complete", "robot", "layers", "shown"], () =>
+      this.update(),
     );
   }
 
   update(): void {
-    const { tab, panel } = this.page.now;
     this.link.want(
       wantedChannels(
         this.page.now,
         this.sources.flatMap((channels) => [...channels()]),
       ),
     );
-    this.link.watchTraffic(panel && tab === "Channels");
+    this.link.watchTraffic(this.page.now.shown.has("Channels"));
   }
 }

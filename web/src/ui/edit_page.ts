@@ -56,8 +56,8 @@ export class EditPage {
     page.watch(["hello", "controlled"], ({ hello, controlled }) => {
       editing.hidden = hello?.mode !== "live" || !controlled;
     });
-    page.watch(["tab", "hello", "world"], ({ tab, hello, world }) => {
-      if (tab === "World" && hello?.mode === "live" && world) void this.library.fill();
+    page.watch(["shown", "hello", "world"], ({ shown, hello, world }) => {
+      if (shown.has("World") && hello?.mode === "live" && world) void this.library.fill();
     });
   }
 

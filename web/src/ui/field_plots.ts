@@ -80,9 +80,9 @@ export class FieldPlots {
 
   // Those that are plotted, and the one whose fields are offered.
   get channels(): string[] {
-    const { tab, panel, world } = this.page.now,
+    const { shown, world } = this.page.now,
       type = world?.channels.find(({ name }) => name === this.channel.value)?.type,
-      isOffered = panel && tab === "Plots" && type !== "image_t" && this.channel.value;
+      isOffered = shown.has("Plots") && type !== "image_t" && this.channel.value;
     return [
       ...this.panes.flatMap(({ series }) => series.flatMap(({ channels }) => channels)),
       ...(isOffered ? [this.channel.value] : []),

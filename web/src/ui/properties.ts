@@ -48,7 +48,7 @@ export class PropertyList {
     };
     this.element = h("div", { id: "properties" }, ...Object.values(this.rows), this.words);
     this.listen();
-    page.watch(["selected", "scene", "tab"], () => void this.show());
+    page.watch(["selected", "scene", "shown"], () => void this.show());
   }
 
   private number(label: string, property: string, max: number): HTMLInputElement {
@@ -125,9 +125,9 @@ export class PropertyList {
   }
 
   private async show(): Promise<void> {
-    const { selected, tab, hello } = this.page.now,
+    const { selected, shown, hello } = this.page.now,
       asked = ++this.asked;
-    this.element.hidden = !selected || tab !== "World" || hello?.mode !== "live";
+    this.element.hidden = !selected || !shown.has("World") || hello?.mode !== "live";
     if (this.element.hidden) return;
     const text = await this.editor.textOf(selected);
     if (asked !== this.asked || this.pending) return;
