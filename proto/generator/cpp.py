@@ -18,15 +18,8 @@ SCALARS = {
     "double": ("double", "0.0", "float64"),
     "string": ("std::string", "", "string"),
 }
-ARRAYS = {
-    "boolean": ("bool", "booleans"),
-    "byte": ("uint8_t", "bytes"),
-    "int64_t": ("int64_t", "int64s"),
-    "float": ("float", "floats"),
-    "double": ("double", "doubles"),
-    "string": ("std::string", "strings"),
-}
-FIXED = {"3": "Vector3", "4": "Quaternion"}
+ARRAYS = {"boolean": "bool", "byte": "uint8_t", "string": "std::string"}  # others: the type itself
+FIXED = {"3": "Vector3", "4": "Quaternion"}  # of doubles
 
 
 def comment(text: str, indent: str = "") -> list[str]:
@@ -81,20 +74,35 @@ def zero(one: Enum) -> str:
     return next((value.name for value in one.values if value.value == 0), "unknown")
 
 
-def declaration(one: Field, vocabulary: Vocabulary) -> str:
+def type_of(one: Field) -> str:
     member = one.member
     assert member
-    if one.enum:
-        return f"{one.enum} {one.name} = {one.enum}::{zero(vocabulary.enums[one.enum])};"
-    if one.part:
-        return f"std::vector<{one.part}> {one.name};"
-    if not member.dims:
-        type, initial, _ = SCALARS[member.type]
-        return f"{type} {one.name} = {initial};" if initial else f"{type} {one.name};"
+    if one.enum or one.part:
+        return one.enum or f"std::vector<{one.part}>"
+    return array_of(member) if member.dims else SCALARS[member.type][0]
+
+
+def array_of(member: Member) -> str:
     (count,) = member.dims
-    if count.isdigit():
-        return f"{FIXED.get(count, f'std::array<double, {count}>')} {one.name}{{}};"
-    return f"std::vector<{ARRAYS[member.type][0]}> {one.name};"
+    own = ARRAYS.get(member.type, member.type)
+    if count in FIXED and own == "double":
+        return FIXED[count]
+    return f"std::array<{own}, {count}>" if count.isdigit() else f"std::vector<{own}>"
+
+
+def declaration(one: Field, vocabulary: Vocabulary) -> str:
+    member, type = one.member, type_of(one)
+    assert member
+    if one.enum:
+        return f"{type} {one.name} = {one.enum}::{zero(vocabulary.enums[one.enum])};"
+    if not member.dims:
+        initial = SCALARS[member.type][1]
+        return f"{type} {one.name} = {initial};" if initial else f"{type} {one.name};"
+    return (
+        f"{type} {one.name}{{}};"
+        if member.dims[0].isdigit() and not one.part
+        else f"{type} {one.name};"
+    )
 
 
 def record(one: Record, vocabulary: Vocabulary, methods: Path) -> list[str]:
@@ -138,9 +146,10 @@ def read_value(member: Member, field: Field | None) -> str:
         value = f"in.{read}()"
         return f"known<{field.enum}>({value})" if field and field.enum else value
     (count,) = member.dims
-    if count.isdigit():
-        return f"in.array<{count}>()"
-    return f"in.{ARRAYS[member.type][1]}({count})"
+    own = ARRAYS.get(member.type, member.type)
+    return (
+        f"read_array<{own}, {count}>(in)" if count.isdigit() else f"read_values<{own}>(in, {count})"
+    )
 
 
 def read_members(one: Record, vocabulary: Vocabulary, at: str) -> list[str]:
@@ -212,7 +221,8 @@ def decoders(vocabulary: Vocabulary) -> list[str]:
     types = sorted(one.message.name for one in samples)
     lines = [MADE, "// How samples come off the wire, and the texts of enumerations."]
     lines += [f'#include "ruedo/{type}.hpp"' for type in types]
-    lines += ['#include "sample_types.h"', "", "namespace ruedo::client {", "namespace {", ""]
+    lines += ['#include "sample_types.h"', '#include "wire_values.h"', ""]
+    lines += ["namespace ruedo::client {", "namespace {", ""]
     for part in vocabulary.parts.values():
         lines += part_reader(part, vocabulary)
     for sample in samples:
@@ -233,8 +243,8 @@ def decoders(vocabulary: Vocabulary) -> list[str]:
 def argument(one: Argument) -> str:
     """As a declaration has it."""
     if one.member.dims:
-        type = f"const {FIXED.get(one.member.dims[0], 'double')}&"
-        return f"{type} {one.name}" + (" = {}" if one.default is not None else "")
+        default = " = {}" if one.default is not None else ""
+        return f"const {array_of(one.member)}& {one.name}{default}"
     own = SCALARS[one.member.type][0]
     type = "const std::string&" if own == "std::string" else own
     default = f' = "{one.default}"' if own == "std::string" else f" = {one.default}"
@@ -243,9 +253,7 @@ def argument(one: Argument) -> str:
 
 def returned(one: Request) -> str:
     if one.result:
-        assert one.result.member
-        member = one.result.member
-        return FIXED[member.dims[0]] if member.dims else SCALARS[member.type][0]
+        return type_of(one.result)
     return one.reply.name if one.reply else "void"
 
 
@@ -353,7 +361,7 @@ def requests_source(vocabulary: Vocabulary) -> list[str]:
         '#include "core.h"',
     ]
     lines += [f'#include "ruedo/{type}.hpp"' for type in sorted(types)]
-    lines += ['#include "wire_reader.h"', "", "namespace ruedo::client {", ""]
+    lines += ['#include "wire_values.h"', "", "namespace ruedo::client {", ""]
     for reply in vocabulary.replies.values():
         lines += reply_reader(reply, vocabulary)
     for one in vocabulary.made_requests:

@@ -21,6 +21,9 @@ SCALARS = {
 ARRAYS = {
     "boolean": ("boolean[]", "bools"),
     "byte": ("byte[]", "bytes"),
+    "int8_t": ("byte[]", "bytes"),
+    "int16_t": ("short[]", "int16s"),
+    "int32_t": ("int[]", "int32s"),
     "int64_t": ("long[]", "int64s"),
     "float": ("float[]", "floats"),
     "double": ("double[]", "doubles"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable
 
 from table import Argument, Enum, Field, Record, Request, Vocabulary
 
@@ -17,7 +18,8 @@ SCALARS = {
     "double": "float",
     "string": "str",
 }
-ARRAYS = {"boolean": "bool_", "int64_t": "int64"}  # numpy's, where it is not float64
+ARRAYS = {"boolean": "bool_", "int8_t": "int64", "int16_t": "int64"}  # numpy's, else float64
+ARRAYS |= {"int32_t": "int64", "int64_t": "int64"}
 
 
 def docstring(text: str, indent: str = "") -> list[str]:
@@ -54,9 +56,14 @@ def vocabulary_module(vocabulary: Vocabulary) -> list[str]:
         " them by their number in a message."
     )
     lines += ["", "from .values import Word"]
+    lines += ["", *exported(vocabulary.enums)]
     for one in vocabulary.enums.values():
         lines += enum(one)
     return lines
+
+
+def exported(names: Iterable[str]) -> list[str]:
+    return ["__all__ = [", *(f'    "{name}",' for name in sorted(names)), "]"]
 
 
 def is_array(one: Field) -> bool:
@@ -143,7 +150,11 @@ def stem(one: Record) -> str:
 
 def converter(one: Record, vocabulary: Vocabulary) -> list[str]:
     lines = ["", "", f"def _{stem(one)}(m: Any) -> {one.name}:"]
-    arrays = (m for m in one.message.members if m.dims and m.type in vocabulary.messages)
+    arrays = (
+        member
+        for member in one.message.members
+        if member.type in vocabulary.messages and not member.dims[0].isdigit()
+    )
     lines += [f"    counted(m.{array.dims[0]})" for array in arrays]
     head = ["m.utime"] if vocabulary.has_utime(one) else []
     values = [*head, *(conversion(field, vocabulary) for field in one.of("python"))]
@@ -171,9 +182,10 @@ def samples_module(vocabulary: Vocabulary) -> list[str]:
     lines += ["from typing import Any", "", "import numpy as np"]
     lines += ["from numpy.typing import NDArray", "", "from . import lcmtypes"]
     lines += ["from .errors import for_terminal", "from .geometry import Floats"]
-    lines += ["from .sample_methods import (", *(f"    {name}," for name in mixins), ")"]
+    lines += imported("sample_methods", mixins)
     lines += [f"from .values import {values}"]
     lines += [f"from .vocabulary import {', '.join(tables)}"]
+    lines += ["", *exported(one.name for one in records)]
     for one in records:
         lines += record(one, vocabulary)
     for one in records:
@@ -190,6 +202,13 @@ def samples_module(vocabulary: Vocabulary) -> list[str]:
         type = one.message.name
         lines.append(f'    "{type}": (lcmtypes.{type}, _{stem(one)}),')
     return [*lines, "}"]
+
+
+def imported(module: str, names: list[str]) -> list[str]:
+    line = f"from .{module} import {', '.join(names)}"
+    if len(line) <= 100:
+        return [line]
+    return [f"from .{module} import (", *(f"    {name}," for name in names), ")"]
 
 
 CHECKS = {
@@ -272,11 +291,15 @@ def requests_module(vocabulary: Vocabulary) -> list[str]:
     lines += ["from __future__ import annotations", ""]
     if any(given.member.dims for one in requests for given in one.arguments):
         lines += ["from collections.abc import Sequence", ""]
-    names = ", ".join(sorted({one.reply.name for one in requests if one.reply}))
+    results = {type_of(one.result) for one in requests if one.result}
+    names = {one.reply.name for one in requests if one.reply}
+    names |= {one.result.part for one in requests if one.result and one.result.part}
+    if any(type.startswith("NDArray") for type in results):
+        lines += ["import numpy as np", "from numpy.typing import NDArray", ""]
     lines += ["from . import arguments, lcmtypes", "from .control import Session, reply_of"]
-    if any(one.result and type_of(one.result) == "Floats" for one in requests):
-        lines.append("from .geometry import Floats")
-    lines += [f"from .samples import {names}", "", "", "class Requests:"]
+    lines += ["from .geometry import Floats"] if "Floats" in results else []
+    lines += imported("samples", sorted(names))
+    lines += ["", "", "class Requests:"]
     lines += docstring(
         "Each raises NotSupported where the server has no such request, RequestError when it refuses,"
         " Timeout and NoServer.",

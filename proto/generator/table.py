@@ -4,6 +4,7 @@ language work from.
 
 from __future__ import annotations
 
+import keyword
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,18 @@ SIZES = {
     "double": 8,
     "string": 5,
 }
+
+
+# Words of the three languages, and what every sample has.
+WORDS = """
+auto bool boolean break byte case catch char class const continue default delete do double else enum
+explicit export extends false final finally float for friend goto if implements import inline int
+instanceof interface long mutable namespace native new null operator package private protected
+public register return short signed sizeof static struct super switch synchronized template this
+throw throws transient true try typedef typename union unsigned using virtual void volatile while
+utime time
+"""
+RESERVED = {*WORDS.split(), *keyword.kwlist}
 
 
 class Fault(Exception):
@@ -222,6 +235,8 @@ def _field(where: str, name: str, given: dict[str, Any], message: Message) -> Fi
         given,
         "from unit range frame doc note languages shape sizes optional steps enum alias part terminal",
     )
+    if name in RESERVED:
+        raise Fault(f"{where}.{name}: the name means something else in C++, Java or Python")
     steps = tuple(given.get("steps", ()))
     for other in (*steps, *given.get("sizes", ())):
         message.member(other)
@@ -286,6 +301,10 @@ def _enum(name: str, given: dict[str, Any], messages: dict[str, Message]) -> Enu
 def _argument(where: str, name: str, given: dict[str, Any], body: Message) -> Argument:
     _checked(f"{where}.{name}", given, "from unit range frame doc note default")
     member = body.member(given.get("from", name))
+    if name in RESERVED:
+        raise Fault(f"{where}.{name}: the name means something else in C++, Java or Python")
+    if member.dims and (member.type != "double" or not member.dims[0].isdigit()):
+        raise Fault(f"{where}.{name}: of arrays only doubles of a fixed number can be arguments")
     if member.type not in ("double", "string", "boolean", "int32_t", "int64_t"):
         raise Fault(f"{where}.{name}: no argument is of the type {member.type}: make it by hand")
     return Argument(name, member, _texts(given), given.get("default"))
@@ -365,5 +384,20 @@ def _check_references(record: Record, vocabulary: Vocabulary) -> None:
         for language in one.languages:
             if language not in LANGUAGES:
                 raise Fault(f"{where}: {language} is no language: {', '.join(LANGUAGES)} are")
-        if one.member and one.member.type not in SIZES and not one.part:
-            raise Fault(f"{where}: of the type {one.member.type} it needs a part")
+        _check_member(where, one)
+    if record.name in vocabulary.samples and not vocabulary.has_utime(record):
+        raise Fault(f"{record.name}: its message does not begin with int64_t utime")
+
+
+def _check_member(where: str, one: Field) -> None:
+    member = one.member
+    if not member:
+        return
+    if len(member.dims) > 1:
+        raise Fault(f"{where}: an array of arrays: give it a type of its own, and a part")
+    if member.type not in SIZES and not (one.part and member.dims):
+        raise Fault(f"{where}: of the type {member.type} it must be an array, and needs a part")
+    if member.dims and one.enum:
+        raise Fault(f"{where}: an enumeration is of single values")
+    if member.type == "byte" and not member.dims:
+        raise Fault(f"{where}: a single byte: int8_t is a number")

@@ -31,7 +31,7 @@ except ImportError as _error:
 
 _HAS_NUMPY = find_spec("numpy") is not None  # programs of plain LCM need the message types alone
 if TYPE_CHECKING or _HAS_NUMPY:
-    from . import markers
+    from . import markers, samples, vocabulary
     from .callbacks import Subscription
     from .errors import (
         LaunchError,
@@ -52,38 +52,11 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .maps import OccupancyMap, load_map
     from .motion import Motion
     from .robot import Camera, Device, Robot
-    from .samples import (
-        AirPressure,
-        AirSpeed,
-        Altimeter,
-        Box2D,
-        Box3D,
-        Boxes2D,
-        Boxes3D,
-        CameraInfo,
-        Collisions,
-        Contact,
-        ContactPoint,
-        ForceTorque,
-        Image,
-        Imu,
-        Joints,
-        LidarScan,
-        LogicalCamera,
-        LogicalObject,
-        Magnetometer,
-        MotionStatus,
-        NavSat,
-        Odometry,
-        OdometryTwist,
-        Pose,
-        Scan,
-        SonarReading,
-        State,
-    )
+    from .samples import *  # noqa: F403
     from .simulation import Simulation, connect
     from .stream import Reader, Stream
     from .values import Sample
+    from .vocabulary import *  # noqa: F403
     from .world import World
     from .world_info import Body
 
@@ -107,53 +80,26 @@ def __getattr__(name: str) -> object:
 
 
 __all__ = [
-    "AirPressure",
-    "AirSpeed",
-    "Altimeter",
     "Body",
-    "Box2D",
-    "Box3D",
-    "Boxes2D",
-    "Boxes3D",
     "Camera",
-    "CameraInfo",
-    "Collisions",
     "Command",
-    "Contact",
-    "ContactPoint",
     "Device",
-    "ForceTorque",
-    "Image",
-    "Imu",
-    "Joints",
     "LaunchError",
     "LeaseLost",
-    "LidarScan",
-    "LogicalCamera",
-    "LogicalObject",
-    "Magnetometer",
     "Message",
     "Motion",
     "MotionError",
-    "MotionStatus",
-    "NavSat",
     "NoServer",
     "NotSupported",
     "Observations",
     "OccupancyMap",
-    "Odometry",
-    "OdometryTwist",
-    "Pose",
     "Reader",
     "RequestError",
     "Robot",
     "RuedoError",
     "RunEnded",
     "Sample",
-    "Scan",
     "Simulation",
-    "SonarReading",
-    "State",
     "Stream",
     "Subscription",
     "Timeout",
@@ -168,3 +114,5 @@ __all__ = [
     "markers",
     "read_log",
 ]
+if TYPE_CHECKING or _HAS_NUMPY:
+    __all__ += samples.__all__ + vocabulary.__all__

@@ -126,6 +126,18 @@ final class WireReader {
         return values;
     }
 
+    short[] int16s(int n) throws IOException {
+        short[] values = new short[fits(n, 2)];
+        for (int i = 0; i < n; i++) values[i] = int16();
+        return values;
+    }
+
+    int[] int32s(int n) throws IOException {
+        int[] values = new int[fits(n, 4)];
+        for (int i = 0; i < n; i++) values[i] = int32();
+        return values;
+    }
+
     float[] floats(int n) throws IOException {
         float[] values = new float[fits(n, 4)];
         for (int i = 0; i < n; i++) values[i] = bytes.getFloat();
