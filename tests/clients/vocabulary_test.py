@@ -3,13 +3,15 @@ vectors have each value, and each message that a stream can carry has a sample o
 """
 
 import itertools
+import math
 import re
 import shutil
 import subprocess
 import sys
 
 import pytest
-from conftest import HERE, SOURCE
+import tomllib
+from conftest import HERE, PATIENCE, SOURCE
 
 PROTO = SOURCE / "proto"
 
@@ -92,3 +94,57 @@ def test_the_conversations_refuse_with_each_code():
     text = (HERE / "vectors/conversations.json").read_text()
     codes = set(re.findall(r"const int32_t (\w+)", (PROTO / "reply_t.lcm").read_text()))
     assert set(re.findall(r'"refuse": "(\w+)", "text": "why"', text)) == codes - {"OK"}
+
+
+ONE = [1.0, 0.0, 0.0, 0.0]
+SPAWN = {"on_ground": True, "orientation": ONE, "position": [0.0, 0.0, 0.0]}
+PLACE = {"position": [0.0, 0.0, 0.0], "orientation": ONE}
+STILL = {"linear": [0.0, 0.0, 0.0], "angular": [0.0, 0.0, 0.0]}
+NOWHERE = {"position": [math.nan, 0.0, 0.0]}
+# The refusals that the table has: a body that the server refuses so.
+REFUSALS = {
+    ("STEP", "BAD_REQUEST"): {"steps": 0},
+    ("STEP", "REFUSED"): {"steps": 1},  # the run is not paused
+    ("RATE", "BAD_REQUEST"): {"rate": -1.0},
+    ("RATE", "REFUSED"): {"rate": 1.0},  # in lockstep
+    ("RESET", "BAD_REQUEST"): {"what": 9, "seed": -1},
+    ("SPAWN", "BAD_REQUEST"): {"model": "nothing", **SPAWN},
+    ("SPAWN", "REFUSED"): {"model": "p3at", **SPAWN},  # there stands one
+    ("REMOVE", "UNKNOWN_NAME"): {"name": "nobody"},
+    ("SET_POSE", "BAD_REQUEST"): {"name": "p3at", **PLACE, **NOWHERE},
+    ("SET_POSE", "UNKNOWN_NAME"): {"name": "nobody", **PLACE},
+    ("SET_TWIST", "BAD_REQUEST"): {"name": "p3at", **STILL, "linear": [math.inf, 0.0, 0.0]},
+    ("SET_TWIST", "UNKNOWN_NAME"): {"name": "nobody", **STILL},
+    ("GET_STATE", "UNKNOWN_NAME"): {"name": "nobody"},
+    ("RESET_ODOMETRY", "UNKNOWN_NAME"): {"name": "nobody"},
+    ("RESTORE", "UNKNOWN_NAME"): {"name": "nothing"},
+    ("RESTORE", "REFUSED"): {"name": "damaged"},
+    ("SNAPSHOT", "BAD_REQUEST"): {"name": "a/b"},
+    ("SNAPSHOT", "REFUSED"): {"name": "lost"},  # its folder is gone: the last of all
+}
+
+
+def test_the_server_refuses_as_the_table_says(tmp_path):
+    import ruedo
+    from ruedo import lcmtypes
+
+    table = tomllib.loads((PROTO / "vocabulary.toml").read_text())["requests"]
+    listed = {(kind, code) for kind, of in table.items() for code in of.get("errors", {})}
+    assert listed == set(REFUSALS)
+    folder = tmp_path / "snapshots"
+    folder.mkdir()
+    saving = ruedo.launch("arena", args=["--snapshots", str(folder)])
+    with saving as sim, ruedo.launch("arena", lockstep=1) as locked:
+        sim.snapshot("damaged")
+        for path in folder.iterdir():
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+        for (kind, code), values in REFUSALS.items():
+            body = getattr(lcmtypes, table[kind]["body"])()
+            for name, value in values.items():
+                setattr(body, name, value)
+            if (kind, code) == ("SNAPSHOT", "REFUSED"):
+                shutil.rmtree(folder)
+            asked = locked if (kind, code) == ("RATE", "REFUSED") else sim
+            with pytest.raises(ruedo.RequestError) as refused:
+                asked._session.request(getattr(lcmtypes.request_t, kind), body, PATIENCE)
+            assert refused.value.code == code, (kind, code, str(refused.value))
