@@ -16,9 +16,10 @@ def drive(
     """
     rng = np.random.default_rng(seed)
     every = {f"{name or robot}/{key}": value for key, value in settings.items()}
-    with Engine(world, spawn=[f"{robot}@{place}"], seed=seed, set=every) as first:
+    spawn = [f"{robot}@{place}"] if place else []  # or the world has the robot
+    with Engine(world, spawn=spawn, seed=seed, set=every) as first:
         off = [f"{a}/{b}" for a, b, kind in first.devices if kind in ("camera", "sonar")]
-    with Engine(world, spawn=[f"{robot}@{place}"], seed=seed, set=every, disable=off) as engine:
+    with Engine(world, spawn=spawn, seed=seed, set=every, disable=off) as engine:
         engine.begin_run(seed, log=str(file), everything=True)
         quarter = round(0.25 / engine.dt)
         for leg in range(legs):

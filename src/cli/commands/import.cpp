@@ -1,12 +1,14 @@
-// ruedo import: the maps of ROS, Stage and MobileSim as worlds with walls.
+// ruedo import: the maps of ROS, Stage and MobileSim, and recorded drives, as worlds with walls.
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "cli/support/commands.h"
+#include "cli/support/python.h"
 #include "cli/support/range.h"
 #include "ruedo/errors.h"
 #include "system/output_file.h"
@@ -17,7 +19,7 @@ namespace ruedo::cli {
 namespace {
 
 struct ImportArguments {
-  std::string map, out;
+  std::string map, out, mount, robot;
   double resolution = 0, width = 0, height = 1, thickness = 0.05;
   bool allow_absolute = false;
   std::vector<std::string> sizes;  // the options that give one: each is for one kind of map
@@ -32,8 +34,44 @@ void check_sizes(const ImportArguments& arguments, const std::string& what,
   }
 }
 
+// A log of any kind that ruedo.fit reads, by its first bytes.
+bool is_recorded_drive(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) return true;
+  std::string head(512, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<size_t>(file.gcount()));
+  for (const char* begin :
+       {"\x1f\x8b", "\xed\xa1\xda\x01", "#ROSBAG", "\x89MCAP", "SQLite format 3", "FLASER ",
+        "ROBOTLASER1 ", "ODOM ", "PARAM ", "# message formats"}) {
+    if (head.rfind(begin, 0) == 0) return true;
+  }
+  const std::string line = head.substr(0, head.find('\n'));
+  const bool is_text = std::all_of(line.begin(), line.end(), [](unsigned char c) {
+    return std::isprint(c) || c == '\t' || c == '\r';
+  });
+  return is_text && std::count(line.begin(), line.end(), ',') >= 3;  // a table
+}
+
+int import_drive(const ImportArguments& arguments) {
+  check_sizes(arguments, "a recorded drive", {"--resolution"});
+  std::vector<std::string> words{"import", arguments.map, "--height",
+                                 fmt::format("{}", arguments.height)};
+  const auto add = [&words](const char* option, const std::string& value) {
+    if (!value.empty()) words.push_back(fmt::format("{}={}", option, value));
+  };
+  add("--out", arguments.out);
+  add("--mount", arguments.mount);
+  add("--of", arguments.robot);
+  if (arguments.resolution > 0) add("--resolution", fmt::format("{}", arguments.resolution));
+  return hand_over_to_python("ruedo.fit.cli", "'ruedo[fit]'", words);
+}
+
 int import_map(const ImportArguments& arguments) {
   const std::filesystem::path path = arguments.map;
+  if (is_recorded_drive(path)) return import_drive(arguments);
+  if (!arguments.mount.empty() || !arguments.robot.empty())
+    throw InputError({}, "--mount and --of are for recorded drives");
   std::string kind = path.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -78,14 +116,19 @@ int import_map(const ImportArguments& arguments) {
 }
 
 void add_import(CLI::App& app, Action& chosen) {
-  CLI::App* command =
-      app.add_subcommand("import", "turn a map of ROS, Stage or MobileSim into a world with walls");
+  CLI::App* command = app.add_subcommand(
+      "import",
+      "turn a map of ROS, Stage or MobileSim, or a recorded drive, into a world with walls");
   const auto arguments = std::make_shared<ImportArguments>();
-  command->add_option("MAP", arguments->map, "map_server's .yaml, ARIA's .map, or a picture")
+  command
+      ->add_option("MAP", arguments->map,
+                   "map_server's .yaml, ARIA's .map, a picture, or a log of a drive with scans")
       ->required();
   command->add_option("-o,--out", arguments->out, "the world (default: standard output)");
   CLI::Option* resolution =
-      command->add_option("--resolution", arguments->resolution, "of a picture: side of a pixel, m")
+      command
+          ->add_option("--resolution", arguments->resolution,
+                       "of a picture: side of a pixel, m; of a drive: of its map's cells")
           ->check(within(world::kSmallestCell_m, world::kLargestCell_m));
   CLI::Option* width = command
                            ->add_option("--width", arguments->width,
@@ -99,6 +142,13 @@ void add_import(CLI::App& app, Action& chosen) {
       command->add_option("--thickness", arguments->thickness, "of a .map's lines, m")
           ->capture_default_str()
           ->check(within(0.001, 10.0));
+  command
+      ->add_option(
+          "--mount", arguments->mount,
+          "of a drive: where its range finder is on the robot, X,Y,YAW (m, rad; default 0,0,0)")
+      ->type_name("X,Y,YAW");
+  command->add_option("--of", arguments->robot, "of a drive with several robots: which")
+      ->type_name("ROBOT");
   command->add_flag("--allow-absolute", arguments->allow_absolute,
                     "let a .yaml name a picture outside its folder");
   command->callback([=, &chosen] {

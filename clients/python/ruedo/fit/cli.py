@@ -6,8 +6,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
+from collections.abc import Callable
 from pathlib import Path as File
+from typing import Any
 
 from ..errors import NotSupported, RuedoError
 from ..terminal import drop, flush, say, tell
@@ -56,7 +59,71 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("-o", "--output", metavar="FILE", help="the fitted model, SDF")
     one.add_argument("--report", metavar="FILE", help="an HTML page with plots")
     one.add_argument("--json", action="store_true", help="print the values as JSON")
+    _add_import(commands)
     return top
+
+
+def _add_import(commands: Any) -> None:
+    text = "a world from a recorded drive: walls from its scans along its path"
+    one = commands.add_parser("import", help=text, description=text + " (docs/fit.md)")
+    one.set_defaults(action=_import)
+    one.add_argument("LOG", help="a log with scans and a path, of any kind that Ruedo reads")
+    one.add_argument(
+        "-o", "--out", required=True, metavar="WORLD", help="the world, .sdf; its map is put beside it"
+    )
+    one.add_argument("--of", metavar="NAME", default="", help="of an LCM log with several robots: which")
+    one.add_argument(
+        "--resolution", type=_number(0.005, 1), default=0.05, help="side of a cell, m (default 0.05)"
+    )
+    one.add_argument(
+        "--height", type=_number(0.01, 100), default=1.0, help="of the walls, m (default 1)"
+    )
+    one.add_argument(
+        "--mount",
+        type=_mount,
+        default=(0.0, 0.0, 0.0),
+        metavar="X,Y,YAW",
+        help="of the range finder on the robot, m and rad (default 0,0,0)",
+    )
+
+
+def _number(low: float, high: float) -> Callable[[str], float]:
+    """The type of an option: a number in these bounds."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r}: allowed is a number from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def _mount(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(one) for one in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != 3 or not all(abs(one) < 100 for one in values):
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed are three numbers, X,Y,YAW (m, rad)")
+    return values
+
+
+def _import(arguments: argparse.Namespace) -> int:
+    from .read import read
+    from .worlds import make_world
+
+    recording = read(arguments.LOG, arguments.of)
+    made = make_world(
+        recording, File(arguments.out), arguments.mount, arguments.resolution, arguments.height
+    )
+    for finding in recording.findings + [one.text() for one in made.moving]:
+        tell(f"{recording.file}: {finding}")
+    say(made.summary)
+    return GOOD
 
 
 def _fit(arguments: argparse.Namespace) -> int:

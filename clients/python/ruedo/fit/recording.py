@@ -15,7 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(eq=False)
 class Path:
-    """Poses of the robot over time. pose (N, 3): x, y (m), heading (rad, unwrapped)."""
+    """Poses over time. pose (N, 3): x, y (m), heading (rad, unwrapped), of the robot in the
+    world.
+    """
 
     time: Array  # (N,) s, increasing
     pose: Array
