@@ -19,10 +19,10 @@ readonly BUILD_PACKAGES=(
   musl-dev
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables
-# is the firewall that a test runs into; libfaketime sets clocks; debootstrap makes bare systems to try the wheel in; MPFR is the oracle of the elementary functions, and qemu has other processors; ffmpeg makes videos.
+# is the firewall that a test runs into; libfaketime sets clocks; debootstrap makes bare systems to try the wheel in; MPFR is the oracle of the elementary functions, and qemu has other processors; ffmpeg makes videos; libabigail compares binary interfaces.
 readonly TEST_PACKAGES=(
   libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
-  nftables libmpfr-dev qemu-user libfaketime maven doxygen debootstrap ffmpeg
+  nftables libmpfr-dev qemu-user libfaketime maven doxygen debootstrap ffmpeg abigail-tools
 )
 
 # The web console's page is built by node and npm; a machine with an npm from elsewhere keeps that.
