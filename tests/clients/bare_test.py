@@ -112,6 +112,27 @@ def test_c(tmp_path, version):
     assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
 
 
+def test_cpp(tmp_path):
+    page = blocks("protocol.md")
+    (tmp_path / "client.cpp").write_text(page["bare_cpp"])
+    headers, library = library_of("1.5.3")
+    flags = f"-Wall -Wextra -Werror -I{headers} {library} -Wl,-rpath,{library.parent}"
+    run_in(tmp_path, page["bare_cpp_build"].replace("$(pkg-config --cflags --libs lcm)", flags))
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        lines = scans_of([str(tmp_path / "client")], bare(server), 3)
+    assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
+
+
+def test_java(tmp_path):
+    page = blocks("protocol.md")
+    (tmp_path / "lcm.jar").symlink_to(WHEEL / "share/java/lcm.jar")
+    (tmp_path / "Client.java").write_text(page["bare_java"])
+    run_in(tmp_path, page["bare_java_build"])
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        lines = scans_of(["sh", "-c", page["bare_java_run"]], bare(server), 3, tmp_path)
+    assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
+
+
 class Bare:
     """A bus, and the newest message of each kind that was asked for."""
 

@@ -50,7 +50,9 @@ def test_room(tmp_path):
     )
     said, findings = ruedo("import", log, "-o", tmp_path / "room.sdf")
     assert "room.sdf: " in said and "1 places where something moved" in said
-    place = re.search(r"moved at \((.*), (.*)\) m, (.*) m wide, seen from (.*) to (.*) s in", findings)
+    place = re.search(
+        r"moved at \((.*), (.*)\) m, (.*) m wide, seen from (.*) to (.*) s in", findings
+    )
     x, y, size, first, last = map(float, place.groups())
     assert math.hypot(x - 1.5, y - 1.5) < 0.3 and size <= 0.6  # the side that the robot saw
     assert 0 <= first < last < 8

@@ -69,11 +69,20 @@ def _add_import(commands: Any) -> None:
     one.set_defaults(action=_import)
     one.add_argument("LOG", help="a log with scans and a path, of any kind that Ruedo reads")
     one.add_argument(
-        "-o", "--out", required=True, metavar="WORLD", help="the world, .sdf; its map is put beside it"
+        "-o",
+        "--out",
+        required=True,
+        metavar="WORLD",
+        help="the world, .sdf; its map is put beside it",
     )
-    one.add_argument("--of", metavar="NAME", default="", help="of an LCM log with several robots: which")
     one.add_argument(
-        "--resolution", type=_number(0.005, 1), default=0.05, help="side of a cell, m (default 0.05)"
+        "--of", metavar="NAME", default="", help="of an LCM log with several robots: which"
+    )
+    one.add_argument(
+        "--resolution",
+        type=_number(0.005, 1),
+        default=0.05,
+        help="side of a cell, m (default 0.05)",
     )
     one.add_argument(
         "--height", type=_number(0.01, 100), default=1.0, help="of the walls, m (default 1)"
@@ -96,7 +105,9 @@ def _number(low: float, high: float) -> Callable[[str], float]:
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text!r}: allowed is a number from {low:g} to {high:g}")
+            raise argparse.ArgumentTypeError(
+                f"{text!r}: allowed is a number from {low:g} to {high:g}"
+            )
         return value
 
     return read
