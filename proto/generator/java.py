@@ -36,9 +36,13 @@ def camel(name: str) -> str:
     return head + "".join(word[:1].upper() + word[1:] for word in rest)
 
 
+def escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
 def javadoc(text: str, indent: str = "") -> list[str]:
     text = text if text.endswith(".") else text + "."
-    text = text.replace("&", "&amp;").replace("<", "&lt;")
+    text = escaped(text)
     if len(indent) + len(text) + 7 <= 100:
         return [f"{indent}/** {text} */"]
     lines = textwrap.wrap(
@@ -296,10 +300,10 @@ def default(one: Argument) -> str:
 
 def block(texts: list[str]) -> list[str]:
     """A Javadoc comment: a text, and tags with their continuation lines."""
-    lines = textwrap.wrap(texts[0], 93)
+    lines = textwrap.wrap(escaped(texts[0]), 93)
     lines += [""] if texts[1:] else []
     for tag in texts[1:]:
-        lines += textwrap.wrap(tag, 93, subsequent_indent="    ")
+        lines += textwrap.wrap(escaped(tag), 93, subsequent_indent="    ")
     if len(lines) == 1 and len(lines[0]) <= 89:
         return [f"    /** {lines[0]} */"]
     return ["    /**", *(f"     * {line}".rstrip() for line in lines), "     */"]

@@ -88,8 +88,8 @@ def make(vocabulary: Vocabulary) -> dict[str, list[str]]:
         "",
         "In C++ and Java classes of these names; texts in Python, and in the samples of Java.",
     ]
-    for one in vocabulary.enums.values():
-        lines += enum(one)
+    for words in vocabulary.enums.values():
+        lines += enum(words)
     lines += ["", "## Requests", ""]
     lines += [
         "Methods of `Simulation`. Each may also end with NotSupported, where the server has no such request, Timeout and NoServer."
@@ -101,7 +101,7 @@ def make(vocabulary: Vocabulary) -> dict[str, list[str]]:
         "| Request | Method | | Arguments | Returns | Refusals |",
         "|---|---|---|---|---|---|",
     ]
-    lines += [request(one) for one in vocabulary.requests]
+    lines += [request(asked) for asked in vocabulary.requests]
     lines += ["", "## Replies"]
     for one in vocabulary.replies.values():
         lines += record(one, vocabulary)
