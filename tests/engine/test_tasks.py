@@ -517,7 +517,7 @@ def test_settings_and_devices_of_ones_own():
     assert ((ranges <= 1.6 / 8) | (ranges == 1.0)).all() and (ranges < 1.0).any()
     envs.close()
     with pytest.raises(ValueError, match="no field of numbers|no robot has a device"):
-        ruedo.gym.NavigateVectorEnv(1, disable=["robot/lrf"])
+        ruedo.gym.NavigateVectorEnv(1, disable=["robot/lrf"]).reset()
 
 
 def test_a_curriculum_changes_the_task():

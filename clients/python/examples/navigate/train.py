@@ -16,81 +16,38 @@ import argparse
 import csv
 import time
 from pathlib import Path
-from typing import Any
 
-import gymnasium
 import numpy as np
-import ruedo.gym  # noqa: F401    registers the environments
 import torch
 from policy import Policy
+from ruedo.gym.sb3 import SB3VecEnv
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecEnv
-
-
-class Environments(VecEnv):
-    """Gymnasium's vector environments as Stable-Baselines3 takes them."""
-
-    def __init__(self, environments: gymnasium.vector.VectorEnv):
-        self._inner = environments
-        self.finished: list[tuple[bool, bool]] = []  # of each episode: success, collision
-        super().__init__(
-            environments.num_envs,
-            environments.single_observation_space,
-            environments.single_action_space,
-        )
-
-    def reset(self) -> np.ndarray:
-        return self._inner.reset(seed=self._seeds[0])[0]
-
-    def step_async(self, actions: np.ndarray) -> None:
-        self._actions = actions
-
-    def step_wait(self) -> Any:
-        observations, rewards, terminated, truncated, info = self._inner.step(self._actions)
-        over = terminated | truncated
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i in np.flatnonzero(over):
-            infos[i]["terminal_observation"] = info["final_obs"][i]
-            infos[i]["TimeLimit.truncated"] = bool(truncated[i])
-            self.finished.append((bool(info["success"][i]), bool(info["collision"][i])))
-        return observations, rewards.astype(np.float32), over, infos
-
-    def close(self) -> None:
-        self._inner.close()
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        return [getattr(self._inner, attr_name, None)] * self.num_envs
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise NotImplementedError
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        raise NotImplementedError
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        return [False] * self.num_envs
 
 
 class Curve(BaseCallback):
     """Writes a row and the policy after each stretch, and ends the training in time."""
 
-    def __init__(self, environments: Environments, arguments: argparse.Namespace):
+    def __init__(self, arguments: argparse.Namespace):
         super().__init__()
-        self._environments, self._arguments = environments, arguments
+        self._arguments = arguments
+        self._finished: list[tuple[bool, bool]] = []  # of each episode: success, collision
         self._begin = time.monotonic()
         self._file = open(arguments.curve, "w", newline="")
         self._rows = csv.writer(self._file)
         self._rows.writerow(["steps", "seconds", "episodes", "success", "collision"])
 
     def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "episode" in info:
+                self._finished.append((info["is_success"], info["collision"]))
         return time.monotonic() - self._begin < 60.0 * self._arguments.minutes
 
     def _on_rollout_end(self) -> None:
-        if len(self._environments.finished) < 200:
+        if len(self._finished) < 200:
             return
-        ended = np.array(self._environments.finished)
-        self._environments.finished.clear()
+        ended = np.array(self._finished)
+        self._finished.clear()
         seconds = time.monotonic() - self._begin
         success, collision = ended.mean(axis=0)
         self._rows.writerow(
@@ -131,14 +88,7 @@ def main() -> None:
     parser.add_argument("--curve", default=str(here / "curve.csv"))
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
-    environments = Environments(
-        gymnasium.make_vec(
-            "ruedo/Navigate-v0",
-            num_envs=arguments.envs,
-            beams=arguments.beams,
-            autoreset_mode="SameStep",
-        )
-    )
+    environments = SB3VecEnv("ruedo/Navigate-v0", num_envs=arguments.envs, beams=arguments.beams)
     environments.seed(arguments.seed)
     model = PPO(
         "MlpPolicy",
@@ -153,7 +103,7 @@ def main() -> None:
         ent_coef=0.002,
         policy_kwargs={"net_arch": {"pi": [32, 32], "vf": [64, 64]}, "log_std_init": -0.5},
     )
-    model.learn(10**9, callback=Curve(environments, arguments))
+    model.learn(10**9, callback=Curve(arguments))
     policy_of(model).save(arguments.policy)
 
 

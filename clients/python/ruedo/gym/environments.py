@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -146,12 +147,12 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._begin_spaces()
         self._begin_engine(threads)
         self._console: Console | None = None
-        # Pictures are observed when they are first wanted: Gymnasium makes an environment to look
-        # at its spaces before it forks, and after a picture none can be drawn in a fork.
+        self._background: ThreadPoolExecutor | None = None
+        self._sent: Future[Any] | None = None
         self._actions = np.zeros(num_envs, int)
         self._over = np.ones(num_envs, bool)  # wait for a reset
         self._unbegun = np.ones(num_envs, bool)  # have waited since they were made
-        self.task.setup()
+        self._is_set_up = False
 
     def _begin_spaces(self) -> None:
         observed = getattr(self.task, "observation_space", None)
@@ -193,6 +194,17 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self.task.engine, self.task.num_envs = self._engine, self.num_envs
         self.task.scenes = self._scenes
 
+    def _set_up(self) -> None:
+        """Before the first episode, and no earlier: sensors are looked for, and a picture is drawn
+        where one is a camera. Gymnasium makes an environment to look at its spaces before it forks,
+        and after a picture none can be drawn in a fork.
+        """
+        if self._is_set_up:
+            return
+        self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        self.task.setup()
+        self._is_set_up = True
+
     def _world_file(self) -> str | None:
         """Of a task whose world is a file, or has a name."""
         world = self.task.world
@@ -228,10 +240,10 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         seed: environment i draws its scenes from ``seed + i``; or one for each; None goes on with
         the draws that there are.
         """
+        self._refuse_sent("reset()")
         seeds = self._seeds(seed)
         begin = self._masked(options)
-        if not hasattr(self, "_generators"):
-            self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        self._set_up()
         for i in begin:
             if seeds[i] is not None:
                 self._generators[i] = np.random.default_rng(seeds[i])
@@ -243,14 +255,38 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self, actions: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         """One action in every environment."""
+        self._refuse_sent("step()")
         return self._act(checked_actions(actions, self.action_space))
+
+    def send(self, actions: NDArray[Any]) -> None:
+        """Begins a step in the background; `recv` has its result. Refuses wrong actions."""
+        self._refuse_sent("send()")
+        checked = checked_actions(actions, self.action_space)
+        if self._background is None:
+            self._background = ThreadPoolExecutor(1, f"{type(self.task).__name__} step")
+        self._sent = self._background.submit(self._act, checked.copy())
+
+    def recv(
+        self,
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
+        """Waits for the step that `send` has begun, and returns or raises what `step` would."""
+        if self._sent is None:
+            raise gymnasium.error.NoAsyncCallError("call send() before recv()", "recv")
+        sent, self._sent = self._sent, None
+        return sent.result()
+
+    def _refuse_sent(self, call: str) -> None:
+        if self._sent is not None:
+            raise gymnasium.error.AlreadyPendingCallError(
+                f"a step is under way: call recv() before {call}", "send"
+            )
 
     def _act(
         self, actions: NDArray[np.float64]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         if self.autoreset_mode is not AutoresetMode.NEXT_STEP:
             self._check_begun(range(self.num_envs), "the first step()")
-        elif not hasattr(self, "_generators"):
+        elif not self._is_set_up:
             raise gymnasium.error.ResetNeeded("call reset() before the first step()")
         info: Info = {}
         begun = None  # these show their beginning: their first action is the next one
@@ -342,6 +378,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         and the seeds of the episodes to come. It costs some 0.1 ms each, however long they have
         run.
         """
+        self._refuse_sent("save()")
         these = self._indices(indices)
         self._check_begun(these, "save()")
         return SavedEpisodes(
@@ -367,6 +404,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         """
         if not isinstance(saved, SavedEpisodes):
             raise TypeError(f"restore() takes what save() gave, not {shown(saved)}")
+        self._refuse_sent("restore()")
         if self.render_mode == "human":
             raise ValueError(
                 "render_mode 'human' repeats an episode from its beginning, and cannot go back"
@@ -386,9 +424,8 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             )
         if len(set(into)) != len(into):
             raise ValueError("an environment is to be restored twice at once")
+        self._set_up()
         self._restore_worlds(episodes, into)
-        if not hasattr(self, "_generators"):  # one that was never reset
-            self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, episode in zip(into, episodes):
             self._scenes[i] = episode.scene
             self._generators[i] = copy.deepcopy(episode.generator)
@@ -400,12 +437,15 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         """Seen from above: a picture of (256, 256, 3) for each environment; None where the console
         shows it.
         """
+        self._refuse_sent("render()")
         if self.render_mode != "rgb_array":
             return None
         frames = self._engine.observe("overview.data")[:, 0]
         return tuple(frames.reshape(self.num_envs, PICTURE, PICTURE, 3).copy())
 
     def close_extras(self, **_: object) -> None:
+        if self._background:
+            self._background.shutdown()
         if self._console:
             self._console.close()
         self._engine.close()

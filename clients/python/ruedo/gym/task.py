@@ -56,7 +56,7 @@ class Task:
     settings: Mapping[str, object] = {}
     disable: Sequence[str] = ()
 
-    # There from `setup` on.
+    # There when an environment has been made.
     engine: Engine
     num_envs: int
     scenes: list[Any]  # of each environment's episode
@@ -69,7 +69,7 @@ class Task:
         raise NotImplementedError(f"{type(self).__name__} has neither a world nor scene()")
 
     def setup(self) -> None:
-        """The engine is there now: makes arrays, looks for sensors. Once, before all episodes."""
+        """Makes arrays, looks for sensors: the engine is there. Once, before the first episode."""
 
     def begin(self, episodes: NDArray[np.intp]) -> None:
         """New episodes have begun in the environments of these indices, in ``scenes[i]``."""

@@ -1,0 +1,187 @@
+"""ruedo.gym in the hands of learning libraries: Stable-Baselines3's interface and arrays that other
+libraries take without a copy. The libraries themselves are gigabytes: stand-ins of their interfaces
+are in NumPy.
+"""
+
+import importlib
+import sys
+import types
+
+import gymnasium
+import numpy as np
+import pytest
+import ruedo.gym
+
+
+class VecEnv:
+    """What Stable-Baselines3 2.9's base class does for its subclasses."""
+
+    def __init__(self, num_envs, observation_space, action_space):
+        self.num_envs = num_envs
+        self.observation_space, self.action_space = observation_space, action_space
+        self.reset_infos = [{} for _ in range(num_envs)]
+        self._reset_seeds(), self._reset_options()
+        self.render_mode = self.get_attr("render_mode")[0]
+
+    def _reset_seeds(self):
+        self._seeds = [None] * self.num_envs
+
+    def _reset_options(self):
+        self._options = [{} for _ in range(self.num_envs)]
+
+    def _get_indices(self, indices):
+        if indices is None:
+            return range(self.num_envs)
+        return [indices] if isinstance(indices, int) else indices
+
+    def step(self, actions):
+        self.step_async(actions)
+        return self.step_wait()
+
+    def seed(self, seed):
+        self._seeds = [seed + i for i in range(self.num_envs)]
+        return self._seeds
+
+
+@pytest.fixture
+def sb3(monkeypatch):
+    """ruedo.gym.sb3, over Stable-Baselines3 where it is installed."""
+    try:
+        import stable_baselines3  # noqa: F401
+    except ImportError:
+        for name in ("stable_baselines3", "stable_baselines3.common"):
+            monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+        module = types.ModuleType("stable_baselines3.common.vec_env")
+        module.VecEnv = VecEnv
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.delitem(sys.modules, "ruedo.gym.sb3", raising=False)
+    yield importlib.import_module("ruedo.gym.sb3")
+    sys.modules.pop("ruedo.gym.sb3", None)
+
+
+def test_a_rollout_is_that_of_the_vector_environment(sb3):
+    """Through the ends of episodes, by success, collision and time."""
+    options = {"beams": 6, "max_episode_steps": 60}
+    env = sb3.SB3VecEnv("ruedo/Navigate-v0", num_envs=6, **options)
+    envs = ruedo.gym.NavigateVectorEnv(6, autoreset_mode="SameStep", **options)
+    env.seed(4)
+    assert np.array_equal(env.reset(), envs.reset(seed=4)[0]) and env._seeds == [None] * 6
+    actions = (
+        np.random.default_rng(1).uniform([0.8, -0.2], [1, 0.2], (150, 6, 2)).astype(np.float32)
+    )
+    returns, lengths, ends = np.zeros(6), np.zeros(6, int), []
+    for action in actions:
+        observations, rewards, dones, infos = env.step(action)
+        expected = envs.step(action)
+        assert np.array_equal(observations, expected[0]) and rewards.dtype == np.float32
+        assert np.array_equal(rewards, expected[1].astype(np.float32))
+        assert np.array_equal(dones, expected[2] | expected[3]) and len(infos) == 6
+        returns, lengths = returns + expected[1], lengths + 1
+        for i, info in enumerate(infos):
+            if not dones[i]:
+                assert info == {}
+                continue
+            ends.append((info["is_success"], info["collision"], info["TimeLimit.truncated"]))
+            assert sum(ends[-1]) == 1  # for one of these reasons
+            assert np.array_equal(info["terminal_observation"], expected[4]["final_obs"][i])
+            assert info["episode"]["l"] == lengths[i]
+            assert info["episode"]["r"] == pytest.approx(returns[i])
+            returns[i], lengths[i] = 0.0, 0
+    assert {end[1:] for end in ends} >= {(True, False), (False, True)}
+    env.close(), envs.close()
+
+
+def test_attributes_are_of_the_task_that_all_share(sb3):
+    env = sb3.SB3VecEnv(ruedo.gym.Navigate, 3, beams=5, render_mode="rgb_array")
+    assert env.get_attr("obstacles") == [8, 8, 8] and env.get_attr("obstacles", [0, 2]) == [8, 8]
+    assert env.get_attr("render_mode", 1) == ["rgb_array"]
+    env.set_attr("obstacles", 2)
+    env.reset()
+    assert all(scene.sdf.count("name='obstacle") == 2 for scene in env.envs.scenes)
+    assert [one.shape for one in env.get_images()] == [(256, 256, 3)] * 3
+    assert env.env_is_wrapped(object) == [False] * 3
+    with pytest.raises(AttributeError):
+        env.get_attr("nothing")
+    with pytest.raises(AttributeError, match="Navigate has no attribute 'nothing'"):
+        env.set_attr("nothing", 1)
+    with pytest.raises(ValueError, match="which all environments share"):
+        env.set_attr("obstacles", 1, indices=[0])
+    with pytest.raises(NotImplementedError, match="call save of .envs"):
+        env.env_method("save")
+    env.close()
+
+
+def test_drawn_values_are_in_reset_infos(sb3):
+    draws = {"robot.mass": "uniform(0.8, 1.2)"}
+    env = sb3.SB3VecEnv("ruedo/Navigate-v0", 2, beams=5, randomize=draws)
+    env.reset()
+    assert [one["drawn"] for one in env.reset_infos] == [env.envs._engine.drawn(i) for i in (0, 1)]
+    env.close()
+
+
+def test_without_the_library_its_name_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.delitem(sys.modules, "ruedo.gym.sb3", raising=False)
+    with pytest.raises(ImportError, match="pip install stable-baselines3"):
+        importlib.import_module("ruedo.gym.sb3")
+
+
+# ---- Arrays, and steps in the background.
+
+
+def test_other_libraries_take_arrays_without_a_copy():
+    """By DLPack: observations are the caller's own, and the engine's views cannot be written to."""
+    envs = ruedo.gym.NavigateVectorEnv(4, beams=6)
+    first, _ = envs.reset(seed=1)
+    taken = np.from_dlpack(first)
+    assert np.shares_memory(taken, first) and first.flags.writeable and first.flags.c_contiguous
+    kept = first.copy()
+    second, rewards, *_ = envs.step(np.ones((4, 2)))
+    assert not np.shares_memory(first, second) and np.array_equal(taken, kept)
+    assert np.shares_memory(np.from_dlpack(rewards), rewards)
+    view = envs.task.engine.observe("lrf.ranges")
+    seen = np.from_dlpack(view)
+    before = seen.copy()
+    assert np.shares_memory(seen, view) and not seen.flags.writeable
+    envs.step(np.ones((4, 2)))
+    assert np.array_equal(seen, view) and not np.array_equal(seen, before)
+    envs.close()
+
+
+def test_what_is_received_is_what_step_gives():
+    envs, other = (ruedo.gym.NavigateVectorEnv(3, beams=6, max_episode_steps=9) for _ in range(2))
+    envs.reset(seed=1), other.reset(seed=1)
+    for action in np.random.default_rng(1).uniform(-1, 1, (30, 3, 2)):
+        sent = action.copy()
+        envs.send(sent)
+        sent[:] = np.nan  # the caller's own again
+        one, two = envs.recv(), other.step(action)
+        assert all(np.array_equal(a, b) for a, b in zip(one[:4], two[:4]))
+    envs.close(), other.close()
+
+
+def test_calls_out_of_order_are_refused():
+    envs = ruedo.gym.NavigateVectorEnv(2, beams=4)
+    with pytest.raises(gymnasium.error.NoAsyncCallError, match=r"call send\(\) before recv\(\)"):
+        envs.recv()
+    envs.send(np.zeros((2, 2)))
+    with pytest.raises(gymnasium.error.ResetNeeded):  # as step() says it
+        envs.recv()
+    envs.reset(seed=1)
+    with pytest.raises(ValueError, match="finite numbers"):
+        envs.send(np.full((2, 2), np.nan))
+    envs.send(np.zeros((2, 2)))
+    saved = None
+    for call in (
+        lambda: envs.send(np.zeros((2, 2))),
+        lambda: envs.step(np.zeros((2, 2))),
+        envs.reset,
+        envs.save,
+        envs.render,
+    ):
+        with pytest.raises(gymnasium.error.AlreadyPendingCallError, match=r"call recv\(\) before"):
+            saved = call()
+    assert saved is None
+    envs.recv()
+    envs.send(np.zeros((2, 2)))
+    envs.close()  # waits for it
