@@ -69,6 +69,29 @@ def test_says_what_is_wrong(arguments, code, words):
     assert words in result.stderr
 
 
+def test_a_world_by_name_is_no_file_that_would_be_lost():
+    """`ruedo map rooms -o rooms` blamed a file rooms, which is not there."""
+    result = ruedo("map", "rooms", "-o", "rooms")
+    assert result.returncode == 2 and "'rooms': the name ends in .yaml" in result.stderr
+
+
+def test_echo_of_an_unknown_channel_lists_those_that_there_are(tmp_path):
+    address = f"unix://{tmp_path}/bus"
+    server = subprocess.Popen([RUEDO, "run", ARENA, *QUICK, "--lcm", address])
+    try:
+        while not (tmp_path / "bus").exists():
+            assert server.poll() is None
+            time.sleep(0.01)
+        told = ruedo("echo", "p3at/pos", "--timeout", "4", "--lcm", address)
+    finally:
+        server.terminate()
+        server.wait()
+    assert told.returncode == 1
+    line = told.stderr.splitlines()[0]
+    assert line.startswith("ruedo: the server has no channel 'p3at/pos'; did you mean 'p3at/pose'?")
+    assert "p3at/odometry, " in line
+
+
 def test_version_and_help():
     assert ruedo("--version").stdout.startswith("ruedo ")
     text = ruedo("--help").stdout

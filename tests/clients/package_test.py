@@ -100,6 +100,7 @@ def test_images_become_arrays():
 
 def test_images_are_saved(tmp_path):
     import ruedo
+    from PIL import Image
 
     jpeg = b"\xff\xd8\xffwhatever"
     ruedo.Image(0, 8, 8, "jpeg", 0, jpeg).save(tmp_path / "a.jpg")
@@ -108,6 +109,11 @@ def test_images_are_saved(tmp_path):
     assert (tmp_path / "a.ppm").read_bytes() == b"P6 1 2 255\n" + bytes([3, 2, 1, 6, 5, 4])
     with pytest.raises(ValueError, match="array"):
         ruedo.Image(0, 1, 1, "float32", 4, bytes(4)).save(tmp_path / "depth")
+    picture = ruedo.Image(0, 1, 2, "rgb", 3, bytes([1, 2, 3, 4, 5, 6]))
+    picture.save(tmp_path / "a.PNG")
+    assert [*Image.open(tmp_path / "a.PNG").getdata()] == [(1, 2, 3), (4, 5, 6)]
+    with pytest.raises(ValueError, match="rgb pictures are saved as .png or .ppm, not as .jpg"):
+        picture.save(tmp_path / "a.jpg")
 
 
 def test_scan_nearest():

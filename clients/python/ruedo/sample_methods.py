@@ -91,6 +91,9 @@ class PoseMethods:
         w, x, y, z = self.orientation
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
+    def _shown_besides(self) -> str:
+        return f", heading={self.heading:g}"
+
 
 _RAW = {
     "gray": ("u1", 1),
@@ -147,13 +150,24 @@ class ImageMethods:
         return None if self.format == "jpeg" else notebook.png(notebook.visible(self.array()))
 
     def save(self, path: str | Path) -> None:
-        """Writes a JPEG's bytes as they are. Raw 8-bit pictures are written as PPM or PGM."""
-        content = self.data
-        if self.format in ("rgb", "bgr", "gray"):
+        """Writes PNG to a name that ends in .png, else a JPEG's bytes as they are (.jpg) and raw
+        8-bit pictures as PPM or PGM. Raises ValueError for an ending of another format.
+        """
+        ending = Path(path).suffix.lower()
+        own = {"jpeg": [".jpg", ".jpeg"], "gray": [".pgm"]}.get(self.format, [".ppm"])
+        if self.format in ("gray16", "float32"):
+            raise ValueError(f"{self.format} pictures have no common file format: use array()")
+        if ending not in ("", ".png", *own):
+            raise ValueError(
+                f"{self.format} pictures are saved as .png or {own[0]}, not as {ending}"
+            )
+        if ending == ".png":
+            content = notebook.png(self.array())
+        elif self.format == "jpeg":
+            content = self.data
+        else:
             head = "P5" if self.format == "gray" else "P6"
             content = f"{head} {self.width} {self.height} 255\n".encode() + self.array().tobytes()
-        elif self.format != "jpeg":
-            raise ValueError(f"{self.format} pictures have no common file format: use array()")
         Path(path).write_bytes(content)
 
 

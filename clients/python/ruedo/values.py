@@ -34,7 +34,8 @@ class Value:
         shown = ", ".join(
             f"{field.name}={_short(getattr(self, field.name))}" for field in fields(values)
         )
-        return f"{type(self).__name__}({shown})"
+        more = getattr(self, "_shown_besides", str)()  # of some samples
+        return f"{type(self).__name__}({shown}{more})"
 
 
 def _comparable(value: Any) -> Any:

@@ -16,7 +16,10 @@
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
 #include "cli/support/range.h"
+#include "ruedo/decode.h"
+#include "ruedo/element.h"
 #include "ruedo/schema.h"
+#include "ruedo/world_info_t.hpp"
 #include "system/to_stderr.h"
 
 namespace ruedo::cli {
@@ -24,6 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* kInfo = "ruedo/info";
 constexpr int kShownElements = 8;  // of an array
 // What waits to be shown; more is dropped and counted.
 constexpr size_t kMostWaiting = 1000;  // messages
@@ -118,6 +122,38 @@ void print(const Message& message) {
   if (!whole) fmt::print("  ... and then bytes that are not a {}\n", schema->name);
 }
 
+// Warns, once, of channels that the server's list does not have. The list comes in parts.
+class UnknownChannels {
+ public:
+  explicit UnknownChannels(const std::vector<std::string>& asked) {
+    for (const std::string& channel : asked) {
+      const bool is_name = channel.find_first_of(".*+?[](){}|^$\\") == std::string::npos;
+      if (is_name) asked_.push_back(channel);
+    }
+  }
+  void take(const Message& message) {
+    world_info_t info;
+    if (is_done_ ||
+        decode_checked(message.bytes.data(), message.bytes.size(), info) != DecodeFault::none)
+      return;
+    if (info.part == 0) known_.clear();
+    for (const channel_info_t& channel : info.channels) known_.push_back(channel.name);
+    if (info.part + 1 < info.nparts) return;
+    is_done_ = true;
+    for (const std::string& channel : asked_) {
+      if (std::find(known_.begin(), known_.end(), channel) != known_.end()) continue;
+      const std::string near = nearest_word(channel, known_);
+      to_stderr("ruedo: the server has no channel '{}'{}; there are {}\n", for_terminal(channel),
+                near.empty() ? "" : "; did you mean '" + near + "'?",
+                for_terminal(fmt::format("{}", fmt::join(known_, ", "))));
+    }
+  }
+
+ private:
+  std::vector<std::string> asked_, known_;
+  bool is_done_ = false;
+};
+
 struct EchoArguments {
   std::vector<std::string> channels;
   std::string lcm;
@@ -129,16 +165,24 @@ int echo(const EchoArguments& arguments) {
   read_given_types();
   Mailbox mailbox;
   bus::LcmBus bus(arguments.lcm);
-  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
+  const bool shows_info = std::find(arguments.channels.begin(), arguments.channels.end(), kInfo) !=
+                          arguments.channels.end();
+  std::vector<std::string> heard = arguments.channels;
+  if (!shows_info) heard.emplace_back(kInfo);
+  bus.listen(heard, [&](const std::string& channel, const uint8_t* data, size_t size) {
     mailbox.put(channel, data, size);
   });
+  UnknownChannels unknown(arguments.channels);
   const auto patience = arguments.timeout_s > 0.0
                             ? std::chrono::duration<double>(arguments.timeout_s)
                             : std::chrono::hours(24 * 365);
   Message message;
   for (int seen = 0; arguments.count == 0 || seen < arguments.count; ++seen) {
-    if (!mailbox.take(message,
-                      Clock::now() + std::chrono::duration_cast<Clock::duration>(patience))) {
+    const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(patience);
+    bool came = mailbox.take(message, until);
+    for (; came && message.channel == kInfo && !shows_info; came = mailbox.take(message, until))
+      unknown.take(message);
+    if (!came) {
       to_stderr("ruedo: nothing on {} for {:g} s, on {}\n",
                 fmt::format("{}", fmt::join(arguments.channels, ", ")), arguments.timeout_s,
                 bus.url().str());

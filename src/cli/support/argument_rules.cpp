@@ -91,6 +91,8 @@ void check_outputs(const CLI::App& command) {
     for (const CLI::Option* other : options) {
       if (other == output) continue;
       for (const std::string& file : other->results()) {
+        std::error_code error;
+        if (!is_output(*other) && !fs::exists(file, error)) continue;  // a world's name
         if (!same_file(output->results().front(), file)) continue;
         throw InputError({}, output->get_name() + " is the same file as " + other->get_name() +
                                  ", which would be lost: " + file);
