@@ -40,6 +40,47 @@ TEST(JointKinds, AMimicFollowsItsLeader) {
   EXPECT_NEAR(w.physics.joint_velocity(JointIndex(follower)), -0.1, 1e-4);
 }
 
+// A gripper that presses a box by an effort holds it still: friction of 0.6 bears 2 * 0.6 * 20 N,
+// more than its 5 N, and nothing moves the fingers to and fro.
+TEST(JointKinds, AMimicThatPressesByEffortHolds) {
+  const auto finger = [](const std::string& name, const std::string& y) {
+    return "<link name='" + name + "'><pose>0 " + y +
+           " 1 0 0 0</pose><inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx><iyy>1e-4</iyy>"
+           "<izz>1e-4</izz></inertia></inertial><collision name='c'><geometry><box><size>0.03 0.01 "
+           "0.06</size></box></geometry><surface><friction><ode><mu>0.6</mu><mu2>0.6</mu2></ode>"
+           "</friction></surface></collision></link>";
+  };
+  for (const double aside : {0.0, 0.003}) {
+    for (const int64_t step_us : {1000, 5000, 20'000}) {
+      World w(
+          "<model name='m'>" + finger("l", "-0.03") + finger("r", "0.03") +
+              joint("left", "prismatic", "world", "l", "0 1 0") +
+              joint("right", "prismatic", "world", "r", "0 1 0",
+                    "<mimic joint='left'><multiplier>-1</multiplier><offset>0</offset></mimic>") +
+              "</model>" +
+              thing("box", "0 " + std::to_string(aside) + " 1 0 0 0",
+                    "<box><size>0.04 0.04 0.04</size></box>", 0.5, 0.6, 1e-4),
+          step_us);
+      w.physics.set_gravity(w.body("box/l"), Vec3::Zero());
+      w.physics.apply_joint_effort(JointIndex(0), 20.0);
+      w.run(1.0);
+      w.physics.set_gravity(w.body("box/l"), Vec3(0, 0, -10));
+      w.run(0.5);
+      const Vec3 start = w.position("box/l");
+      double fastest = 0.0;
+      for (int64_t t = 0; t < 5'000'000; t += step_us) {
+        w.physics.step();
+        fastest = std::max({fastest, std::abs(w.physics.joint_velocity(JointIndex(0))),
+                            w.physics.twist(w.body("box/l")).linear.norm()});
+      }
+      EXPECT_LT(fastest, 1e-3) << aside << " " << step_us;
+      EXPECT_LT((w.position("box/l") - start).norm(), 1e-3) << aside << " " << step_us;
+      EXPECT_NEAR(start.y(), 0.0, 1e-3);
+      EXPECT_NEAR(start.z(), 1.0, 5e-3);
+    }
+  }
+}
+
 // A load of 1 kg on a vertical screw of 10 mm per turn: it goes down by 10 mm per turn when it is
 // turned, and where nothing holds it, it falls with m g = (m + J / p^2) a, where p is the travel
 // per radian.

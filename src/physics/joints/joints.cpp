@@ -382,9 +382,13 @@ void JointConstraint::mesh_gears(double substep_s) {
 
 void JointConstraint::follow(double leader_position, double leader_rate, double substep_s) {
   constexpr double kEachSubstep = 0.3;  // of the lag corrected
+  // Of the change of the leader's rate. Where they press something between them, the follower moves
+  // the leader: at once, they would throw it to and fro.
+  constexpr double kAnswered = 0.3;
+  leader_rate_ = follows_ ? leader_rate_ + kAnswered * (leader_rate - leader_rate_) : leader_rate;
   follows_ = true;
   follow_rate_ =
-      bounded(multiplier_ * leader_rate +
+      bounded(multiplier_ * leader_rate_ +
                   kEachSubstep * (multiplier_ * leader_position + offset_ - position_) / substep_s,
               limits_.velocity);
 }

@@ -23,6 +23,7 @@ struct JointState {
   enum class Mode { passive, motor, effort, servo };
   bool follows_ = false;  // in the coming substep, with follow_rate_
   double follow_rate_ = 0.0;
+  double leader_rate_ = 0.0;           // smoothed
   double parent_position_ = 0.0;       // rad about the first axis
   world::JointAxis limits_, limits2_;  // limits2_: second axis of universal joints and gearboxes
   struct {
@@ -35,9 +36,9 @@ struct JointState {
   double position_ = 0.0, effort_ = 0.0;
 
   void exchange(StateArchive& archive) {
-    archive(follows_, follow_rate_, parent_position_, limits_.effort, limits_.velocity,
-            limits_.rate_gain, told_, servo_, woken_at_, mode_, command_, lowest_effort_,
-            highest_effort_, gain_, position_, effort_);
+    archive(follows_, follow_rate_, leader_rate_, parent_position_, limits_.effort,
+            limits_.velocity, limits_.rate_gain, told_, servo_, woken_at_, mode_, command_,
+            lowest_effort_, highest_effort_, gain_, position_, effort_);
   }
 };
 
