@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LIBRARIES = {
     "Bullet": (
         ("btBullet", "bullet/", "LinearMath/", "BulletCollision/", "BulletDynamics/"),
-        {"physics"},
+        {"physics", "world/convex"},
     ),
     "Embree": (("embree3/", "embree4/"), {"scene"}),
     "OpenGL": (("GL/", "EGL/"), {"scene"}),
@@ -435,6 +435,7 @@ def test_layers_are_those_of_the_design():
         "base",
         "system",
         "http",
+        "world/convex",
         "world",
         "scene",
         "physics",

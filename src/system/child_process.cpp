@@ -32,6 +32,11 @@ class MemoryFile {
   explicit MemoryFile(const char* name) : file_(::memfd_create(name, MFD_CLOEXEC)) {
     if (!file_) fail("no memory for what another program writes");
   }
+  MemoryFile(const char* name, std::string_view content) : MemoryFile(name) {
+    if (write_all(get(), content.data(), content.size()) != content.size())
+      fail("no memory for what another program reads");
+    ::lseek(get(), 0, SEEK_SET);
+  }
   int get() const { return file_.get(); }
 
   // The last bytes of it, `most` at most.
@@ -59,7 +64,7 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 }
 
 // Runs in the child, between fork and exec: system calls only. posix_spawn cannot set limits.
-[[noreturn]] void become(char* const* arguments, int output, int messages,
+[[noreturn]] void become(char* const* arguments, int input, int output, int messages,
                          const ProcessLimits& limits, const ReadySandbox* sandbox, pid_t parent) {
   ::setpgid(0, 0);
   end_with_parent(parent);
@@ -67,8 +72,7 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
   set_limit(RLIMIT_CPU, limits.cpu_s);
   set_limit(RLIMIT_FSIZE, limits.output_bytes);
   if (limits.memory_bytes > 0) set_limit(RLIMIT_AS, limits.memory_bytes);
-  const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-  ::dup2(nothing, 0);
+  ::dup2(input, 0);
   ::dup2(output, 1);
   ::dup2(messages, 2);
   if (sandbox && !sandbox->enter()) ::_exit(126);
@@ -117,19 +121,19 @@ std::optional<int> wait_for(pid_t child, int wall_s, const std::function<bool()>
 }  // namespace
 
 ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& limits,
-                          const std::function<bool()>& give_up) {
+                          const std::function<bool()>& give_up, std::string_view input) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   std::optional<ReadySandbox> sandbox;
   if (limits.sandbox) sandbox.emplace(*limits.sandbox);
-  const MemoryFile output("output"), messages("messages");
+  const MemoryFile read("input", input), output("output"), messages("messages");
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();  // posix_spawn sets no limits
   if (child < 0) fail("no process can be started");
   if (child == 0) {
-    become(arguments.data(), output.get(), messages.get(), limits, sandbox ? &*sandbox : nullptr,
-           parent);
+    become(arguments.data(), read.get(), output.get(), messages.get(), limits,
+           sandbox ? &*sandbox : nullptr, parent);
   }
   ProcessResult result{wait_for(child, limits.wall_s, give_up), {}, {}};
   if (!result.status) return result;

@@ -117,5 +117,87 @@ TEST_F(Meshes, ARidgeCarries) {
   EXPECT_NEAR(w.position("r/l").z(), 0.1, 2e-3);
 }
 
+class Hollow : public Meshes {
+ protected:
+  // A body of revolution about z with that many sides: a closed outline of (r, z),
+  // counter-clockwise with z up and r to the right; it may begin and end on the axis. Returns its
+  // file.
+  std::string turned(const std::vector<std::pair<double, double>>& outline, int sides) {
+    const auto path = folder_ / "turned.obj";
+    std::ofstream file(path);
+    file.precision(9);
+    for (const auto& [r, z] : outline) {
+      for (int k = 0; k < sides; ++k)
+        file << "v " << r * std::cos(2 * M_PI * k / sides) << ' '
+             << r * std::sin(2 * M_PI * k / sides) << ' ' << z << '\n';
+    }
+    const int rings = static_cast<int>(outline.size());
+    for (int i = 0; i < rings; ++i) {
+      const int next = (i + 1) % rings;
+      for (int k = 0; k < sides; ++k) {
+        const int a = i * sides + k + 1, b = i * sides + (k + 1) % sides + 1,
+                  c = next * sides + (k + 1) % sides + 1, d = next * sides + k + 1;
+        if (outline[i].first > 0) file << "f " << a << ' ' << b << ' ' << d << '\n';
+        if (outline[next].first > 0) file << "f " << b << ' ' << c << ' ' << d << '\n';
+      }
+    }
+    return path.string();
+  }
+  // Of 80 mm across, 100 mm high, with walls and a floor of 3 mm.
+  std::string cup(int sides) {
+    return turned({{0, 0}, {.04, 0}, {.04, .1}, {.037, .1}, {.037, .003}, {0, .003}}, sides);
+  }
+  static std::string mesh(const std::string& file, const std::string& optimization = "",
+                          double scale = 1) {
+    const std::string s = std::to_string(scale);
+    return "<mesh" + (optimization.empty() ? "" : " optimization='" + optimization + "'") +
+           "><uri>" + file + "</uri><scale>" + s + ' ' + s + ' ' + s + "</scale></mesh>";
+  }
+  static std::string ball(double radius, double height) {
+    return thing("ball", "0.003 0.002 " + std::to_string(height) + " 0 0 0",
+                 "<sphere><radius>" + std::to_string(radius) + "</radius></sphere>", 0.05, 0.5,
+                 0.02 * radius * radius);
+  }
+};
+
+TEST_F(Hollow, ACupHoldsABall) {
+  for (const double scale : {0.5, 1.0, 10.0}) {
+    for (const auto& [sides, optimization] :
+         {std::pair(12, ""), {33, ""}, {32, "convex_decomposition"}}) {
+      for (const int64_t step_us : {1000, 5000, 20'000}) {
+        World w(kPlane +
+                    thing("cup", "0 0 0 0 0 0", mesh(cup(sides), optimization, scale), 0.2, 0.5,
+                          5e-4 * scale * scale) +
+                    ball(0.025 * scale, 0.13 * scale),
+                step_us);
+        w.run(2.0);
+        const Vec3 there = w.position("ball/l") - w.position("cup/l");
+        EXPECT_NEAR(there.z(), (0.003 + 0.025) * scale, 1e-3) << scale << sides << step_us;
+        EXPECT_LT(std::hypot(there.x(), there.y()), 0.012 * scale) << scale << sides << step_us;
+        EXPECT_NEAR(w.position("cup/l").z(), 0.0, 1e-3) << scale << sides << step_us;
+      }
+    }
+  }
+}
+
+TEST_F(Hollow, OnlyItsHullIfTheFileSaysSo) {
+  World w(kPlane + thing("cup", "0 0 0 0 0 0", mesh(cup(12), "convex_hull"), 0.2, 0.5, 5e-4) +
+              ball(0.025, 0.13),
+          5000);
+  w.run(2.0);
+  EXPECT_NEAR(w.position("ball/l").z(), 0.125, 1e-3);
+}
+
+// A ring falls over a post.
+TEST_F(Hollow, ARingFallsOverAPost) {
+  const std::string ring = turned({{.05, -.01}, {.07, -.01}, {.07, .01}, {.05, .01}}, 24);
+  World w(kPlane + thing("ring", "0 0 0.3 0 0 0", mesh(ring), 0.2, 0.5, 5e-4) +
+              thing("post", "0 0 0.1 0 0 0",
+                    "<cylinder><radius>0.03</radius><length>0.2</length></cylinder>", 0),
+          5000);
+  w.run(2.0);
+  EXPECT_NEAR(w.position("ring/l").z(), 0.01, 1e-3);
+}
+
 }  // namespace
 }  // namespace ruedo::physics::testing

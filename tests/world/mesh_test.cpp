@@ -340,6 +340,42 @@ TEST_F(Meshes, CacheIsUsedAndABrokenEntryIsNot) {
   EXPECT_EQ(fault_of(path, none), "");      // and replaced
 }
 
+// An angle of two plates, 3 x 3 x 1 m with a corner of 2 x 2 m cut out, is two pieces.
+TEST_F(Meshes, PiecesAreCached) {
+  std::string angle;
+  for (const char* z : {" 0\n", " 1\n"}) {
+    for (const char* xy : {"0 0", "3 0", "3 1", "1 1", "1 3", "0 3"})
+      angle += std::string("v ") + xy + z;
+  }
+  angle += "f 4 3 2\nf 4 2 1\nf 4 1 6\nf 4 6 5\nf 8 9 10\nf 7 8 10\nf 12 7 10\nf 11 12 10\n";
+  for (int k = 0; k < 6; ++k) {
+    const std::string from = std::to_string(k + 1), to = std::to_string((k + 1) % 6 + 1),
+                      over = std::to_string((k + 1) % 6 + 7), up = std::to_string(k + 7);
+    angle += "f " + from + ' ' + to + ' ' + over + "\nf " + from + ' ' + over + ' ' + up + '\n';
+  }
+  const std::string path = folder.write("angle.obj", angle), box = folder.write("box.stl", stl());
+  const auto pieces_of = [&](const std::string& file, const MeshImport& settings) {
+    const ResourceFinder finder(file, true);
+    MeshLoader loader(finder, textures, settings);
+    return loader.load_pieces(loader.load(file), 64);
+  };
+  const auto pieces = pieces_of(path, import());
+  ASSERT_TRUE(pieces);
+  ASSERT_EQ(pieces->parts.size(), 2u);
+  EXPECT_NEAR(volume(*pieces), 5.0, 1e-3);
+  EXPECT_FALSE(pieces_of(box, import())) << "a box needs no pieces";
+  MeshImport none = import(), uncached = import();
+  none.importer = "/nowhere/importer";
+  uncached.cache = false;
+  for (const MeshImport& settings : {none, uncached}) {
+    const auto again = pieces_of(path, settings);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->positions, pieces->positions);
+    EXPECT_EQ(again->triangles, pieces->triangles);
+  }
+  EXPECT_FALSE(pieces_of(box, none));
+}
+
 TEST_F(Meshes, ImportersThatFailDoNotHarmUs) {
   const std::string path = folder.write("box.stl", stl());
   const auto fake = [&](const std::string& name, const std::string& script) {

@@ -261,13 +261,14 @@ void RigidBodies::make_compound(const world::WorldModel& world, const world::Bod
       shapes.clear();
       if (wheel.valid() && collision.geometry.shape == world::Shape::cylinder) {
         shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
-      } else if (!shapes_.moving(collision.geometry, shapes)) {
+      } else if (!shapes_.moving(collision.geometry, wheel.valid(), shapes)) {
         findings.push_back(
             {Finding::Kind::unsupported, collision.source,
              "model " + instance.name + "/link " + link.name + "/collision " + collision.name,
              "a concave or open mesh on a body that moves: it collides as " +
-                 std::to_string(shapes.size()) +
-                 " convex piece(s), the hulls of its connected parts"});
+                 std::to_string(shapes.size()) + " convex piece(s), " +
+                 (collision.geometry.pieces ? "which have more than 5 % more volume"
+                                            : "the hulls of its connected parts")});
       }
       const Pose X_IC = (X_IB * link_placement.X_BL * collision.X_LC).normalized();
       for (btCollisionShape* shape : shapes) {

@@ -169,7 +169,7 @@ void Distances::Impl::add(const world::WorldModel& world, LinkIndex link) {
     if (wheel && geometry.shape == world::Shape::cylinder) {
       shapes.push_back(shapes_.tyre(geometry.size.x(), geometry.size.y()));
     } else if (own || placement.body.valid()) {
-      shapes_.moving(geometry, shapes);
+      shapes_.moving(geometry, wheel, shapes);
     } else if (btCollisionShape* shape = shapes_.fixed(geometry)) {
       shapes.push_back(shape);
     }

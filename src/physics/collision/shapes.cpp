@@ -21,10 +21,10 @@ namespace {
 // Bullet rounds the edges of boxes and cylinders by the margin, without changing their size; its
 // default, 40 mm, is as large as a robot's wheel.
 constexpr double kMargin_m = 1e-3;
-constexpr size_t kMaxPieces = 32;
+constexpr size_t kMaxPieces = 64;
 constexpr size_t kMaxHullVertices = 128;
-// A mesh is concave if its hulls enclose that much more volume than it does.
-constexpr double kConcavity = 0.02;
+// A mesh is concave if its hulls, or its convex pieces, enclose that much more volume than it does.
+constexpr double kConcavity = 0.02, kConcavityOfPieces = 0.05;
 
 double margin_for(double smallest_half_size) {
   return std::min(kMargin_m, 0.1 * smallest_half_size);
@@ -194,40 +194,62 @@ btCollisionShape* ShapeFactory::fixed(const world::Geometry& geometry) {
   return shape;
 }
 
-bool ShapeFactory::moving(const world::Geometry& geometry, std::vector<btCollisionShape*>& shapes) {
-  if (geometry.shape == world::Shape::plane) return true;
-  if (geometry.shape != world::Shape::mesh) {
-    shapes.push_back(primitive(geometry));
-    return true;
-  }
-  if (!geometry.mesh || geometry.mesh->triangles.empty()) return true;
+ShapeFactory::Pieces ShapeFactory::pieces_of(const world::Geometry& geometry,
+                                             const world::Mesh* convex) {
   const world::Mesh& mesh = *geometry.mesh;
   const Vec3& scale = geometry.scale;
-  const auto [entry, is_new] = moving_meshes_.try_emplace({&mesh, scale.x(), scale.y(), scale.z()});
-  Pieces& pieces = entry->second;
-  if (is_new) {
+  std::vector<std::vector<btVector3>> points;
+  double mesh_volume = 0.0, hull_volume = 0.0;
+  for (const auto& t : mesh.triangles) {
+    const btVector3 b = scaled(mesh.positions[t[1]], scale);
+    mesh_volume +=
+        scaled(mesh.positions[t[0]], scale).dot(b.cross(scaled(mesh.positions[t[2]], scale))) / 6.0;
+  }
+  if (convex) {
+    for (const world::Mesh::Part& part : convex->parts) {
+      points.emplace_back();
+      for (uint32_t t = 0; t < part.triangle_count; ++t) {
+        for (const uint32_t i : convex->triangles[part.first_triangle + t])
+          points.back().push_back(scaled(convex->positions[i], scale));
+      }
+    }
+  } else {
     int count = 0;
     std::vector<int> part = connected_parts(mesh, count);
     if (static_cast<size_t>(count) > kMaxPieces) {
       std::fill(part.begin(), part.end(), 0);
       count = 1;
     }
-    std::vector<std::vector<btVector3>> points(static_cast<size_t>(count));
-    double mesh_volume = 0.0, hull_volume = 0.0;
-    for (const auto& triangle : mesh.triangles) {
-      const btVector3 a = scaled(mesh.positions[triangle[0]], scale),
-                      b = scaled(mesh.positions[triangle[1]], scale),
-                      c = scaled(mesh.positions[triangle[2]], scale);
-      mesh_volume += a.dot(b.cross(c)) / 6.0;
-      auto& of_part = points[part[triangle[0]]];
-      of_part.insert(of_part.end(), {a, b, c});
+    points.resize(static_cast<size_t>(count));
+    for (const auto& t : mesh.triangles) {
+      for (const uint32_t i : t) points[part[t[0]]].push_back(scaled(mesh.positions[i], scale));
     }
-    for (const auto& of_part : points) {
-      if (!of_part.empty())
-        pieces.hulls.push_back(own(hull_of(of_part, hulls_ == Hulls::exact, hull_volume)));
-    }
-    pieces.exact = mesh.closed && hull_volume - std::abs(mesh_volume) <= kConcavity * hull_volume;
   }
+  Pieces pieces;
+  for (const auto& of_part : points) {
+    if (!of_part.empty())
+      pieces.hulls.push_back(own(hull_of(of_part, hulls_ == Hulls::exact, hull_volume)));
+  }
+  pieces.exact = mesh.closed && hull_volume - std::abs(mesh_volume) <=
+                                    (convex ? kConcavityOfPieces : kConcavity) * hull_volume;
+  return pieces;
+}
+
+bool ShapeFactory::moving(const world::Geometry& geometry, bool is_wheel,
+                          std::vector<btCollisionShape*>& shapes) {
+  if (geometry.shape == world::Shape::plane) return true;
+  if (geometry.shape != world::Shape::mesh) {
+    shapes.push_back(primitive(geometry));
+    return true;
+  }
+  if (!geometry.mesh || geometry.mesh->triangles.empty()) return true;
+  // A wheel's rim is not felt; its hull is round.
+  const world::Mesh* convex = is_wheel ? nullptr : geometry.pieces.get();
+  const Vec3& scale = geometry.scale;
+  const auto [entry, is_new] = moving_meshes_.try_emplace(
+      {convex ? convex : geometry.mesh.get(), scale.x(), scale.y(), scale.z()});
+  Pieces& pieces = entry->second;
+  if (is_new) pieces = pieces_of(geometry, convex);
   shapes.insert(shapes.end(), pieces.hulls.begin(), pieces.hulls.end());
   return pieces.exact;
 }

@@ -25,10 +25,11 @@ class ShapeFactory {
   // For a static body. Null for a mesh without triangles. Planes pass through the origin.
   btCollisionShape* fixed(const world::Geometry& geometry);
 
-  // For a moving body: one shape, or for a mesh the convex hull of each connected part. Appends to
-  // `shapes`; nothing for a plane, which cannot move. Returns false if the shape differs from the
-  // geometry: for a concave mesh.
-  bool moving(const world::Geometry& geometry, std::vector<btCollisionShape*>& shapes);
+  // For a moving body: one shape, or for a mesh its convex pieces, or the convex hull of each
+  // connected part if it has none or is a wheel. Appends to `shapes`; nothing for a plane, which
+  // cannot move. Returns false if the shape differs from the geometry: for a concave mesh.
+  bool moving(const world::Geometry& geometry, bool is_wheel,
+              std::vector<btCollisionShape*>& shapes);
 
   // A wheel with that radius and width about its z axis (m).
   btCollisionShape* tyre(double radius, double width);
@@ -39,8 +40,10 @@ class ShapeFactory {
     std::vector<btCollisionShape*> hulls;
     bool exact = true;
   };
-  using MeshKey =
-      std::tuple<const world::Mesh*, double, double, double>;  // only looked up, never iterated
+  // Only looked up, never iterated.
+  using MeshKey = std::tuple<const world::Mesh*, double, double, double>;
+
+  Pieces pieces_of(const world::Geometry& geometry, const world::Mesh* convex);
 
   btCollisionShape* primitive(const world::Geometry& geometry);
   template <class Shape>

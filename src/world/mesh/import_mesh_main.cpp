@@ -1,8 +1,10 @@
 // ruedo-import-mesh INPUT: converts a mesh file to Ruedo's binary form, with assimp, on stdout.
+// ruedo-import-mesh --pieces MOST: divides the mesh on stdin, in that form, into convex pieces.
 //
 // Runs as a child of the server, under the server's limits on memory and time and in a sandbox of
 // its own: some malformed files make assimp abort or hang, and others may do worse. Exit code 0:
 // the output is complete; otherwise the first line on stderr says why.
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -25,6 +27,7 @@
 #include "base/input_file.h"
 #include "system/file_handle.h"
 #include "system/sandbox.h"
+#include "world/convex/convex_pieces.h"
 #include "world/mesh/mesh_format.h"
 #include "world/read/document.h"
 
@@ -234,7 +237,7 @@ aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   return {};
 }
 
-void import(const fs::path& input, int output) {
+MeshPackage imported(const fs::path& input) {
   std::string extension = input.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (!extension.empty()) extension.erase(0, 1);
@@ -276,7 +279,41 @@ void import(const fs::path& input, int output) {
   fill_missing_normals(package.mesh);
   package.mesh.closed = is_closed(package.mesh);
   package.dependencies = files->dependencies();
+  return package;
+}
 
+// A mesh with a part for each convex piece; one triangle and no parts if there is nothing to
+// divide.
+Mesh divided(const Mesh& mesh, size_t most) {
+  std::vector<Eigen::Vector3d> positions;
+  for (const auto& p : mesh.positions) positions.push_back(p.cast<double>());
+  Mesh pieces;
+  for (const ConvexPiece& piece : convex_pieces(positions, mesh.triangles, most)) {
+    Mesh::Part part;
+    const auto corner = static_cast<uint32_t>(pieces.positions.size());
+    part.first_triangle = static_cast<uint32_t>(pieces.triangles.size());
+    part.triangle_count = static_cast<uint32_t>(piece.triangles.size());
+    for (const auto& p : piece.corners) pieces.positions.push_back(p.cast<float>());
+    for (const auto& t : piece.triangles)
+      pieces.triangles.push_back({corner + t[0], corner + t[1], corner + t[2]});
+    pieces.parts.push_back(part);
+  }
+  if (pieces.parts.empty()) {
+    pieces.positions = {mesh.positions[0]};
+    pieces.triangles = {{0, 0, 0}};
+  }
+  return pieces;
+}
+
+std::string standard_input() {
+  std::string text;
+  std::array<char, 1 << 16> bytes;
+  for (size_t n; (n = std::fread(bytes.data(), 1, bytes.size(), stdin)) > 0;)
+    text.append(bytes.data(), n);
+  return text;
+}
+
+void write(const MeshPackage& package, int output) {
   const std::string bytes = pack_mesh(package);
   if (ruedo::write_all(output, bytes.data(), bytes.size()) != bytes.size())
     throw std::runtime_error(std::string("the result cannot be written: ") + std::strerror(errno));
@@ -285,20 +322,27 @@ void import(const fs::path& input, int output) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
+  const bool divides = argc == 3 && std::strcmp(argv[1], "--pieces") == 0;
+  if (argc != 2 && !divides) {
     std::fprintf(stderr, "usage: ruedo-import-mesh INPUT > OUTPUT\n");
     return 2;
   }
   try {
-    const fs::path mesh = fs::weakly_canonical(argv[1]);
     const ruedo::FileHandle output(::dup(STDOUT_FILENO));
     ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what a library prints is no part of the mesh
     ruedo::Sandbox sandbox;
-    sandbox.readable = {mesh.parent_path().string()};
     sandbox.system = false;
     sandbox.alone = true;
-    ruedo::enter(sandbox);
-    import(mesh, output.get());
+    if (divides) {
+      ruedo::enter(sandbox);
+      const Mesh mesh = unpack_mesh(standard_input()).mesh;
+      write({divided(mesh, std::stoul(argv[2])), {}}, output.get());
+    } else {
+      const fs::path mesh = fs::weakly_canonical(argv[1]);
+      sandbox.readable = {mesh.parent_path().string()};
+      ruedo::enter(sandbox);
+      write(imported(mesh), output.get());
+    }
     return 0;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "it needs more memory than is allowed\n");

@@ -157,6 +157,13 @@ std::string pack_mesh(const MeshPackage& package) {
   return bytes;
 }
 
+std::string pack_solid(const Mesh& mesh) {
+  MeshPackage solid;
+  solid.mesh.positions = mesh.positions;
+  solid.mesh.triangles = mesh.triangles;
+  return pack_mesh(solid);
+}
+
 MeshPackage unpack_mesh(std::string_view bytes) {
   uint64_t check;
   if (bytes.size() < sizeof check) throw std::runtime_error("it ends too early");

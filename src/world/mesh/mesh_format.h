@@ -16,6 +16,8 @@ namespace ruedo::world {
 // Increment it when the importer's results or this format change: old cache entries are then
 // ignored.
 constexpr uint32_t kMeshFormatVersion = 3;
+// The same for the division into convex pieces.
+constexpr uint32_t kPiecesVersion = 1;
 
 struct MeshLimits {
   static constexpr size_t kFileBytes = 256u << 20;  // of a mesh file
@@ -37,6 +39,9 @@ struct MeshPackage {
   Mesh mesh;  // texture paths as written in the file
   std::vector<MeshDependency> dependencies;
 };
+
+// What of a mesh its convex pieces depend on, packed.
+std::string pack_solid(const Mesh& mesh);
 
 // Two independent 64-bit hashes of the bytes as 32 hexadecimal digits; and one of the two.
 std::string content_key(std::string_view bytes);

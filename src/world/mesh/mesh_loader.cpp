@@ -54,18 +54,20 @@ constexpr bool kLimitAddressSpace = false;  // sanitizers reserve terabytes of a
 constexpr bool kLimitAddressSpace = true;
 #endif
 
-// The mesh, packed. Throws std::runtime_error for a mesh that cannot be imported, EnvironmentError
-// where no mesh could be.
-std::string imported(const MeshImport& import, const std::string& input) {
+// The mesh that the importer gives for these arguments and that stdin, packed. Throws
+// std::runtime_error for a mesh that cannot be imported, EnvironmentError where no mesh could be.
+std::string imported(const MeshImport& import, std::vector<std::string> arguments,
+                     std::string_view input = {}) {
   ProcessLimits limits;
   limits.cpu_s = static_cast<rlim_t>(import.cpu_limit_s);
   limits.output_bytes = kMostBytes;
   limits.memory_bytes = kLimitAddressSpace ? import.memory_limit_bytes : 0;
   limits.wall_s = import.wall_limit_s;
   bool out_of_budget = false;
-  ProcessResult result = run_limited({import.importer, input}, limits, [&] {
-    return out_of_budget = import.budget && import.budget->is_over();
-  });
+  arguments.insert(arguments.begin(), import.importer);
+  ProcessResult result = run_limited(
+      std::move(arguments), limits,
+      [&] { return out_of_budget = import.budget && import.budget->is_over(); }, input);
   if (!result.status) {
     if (out_of_budget) import.budget->take_time();
     throw std::runtime_error("the importer took longer than " +
@@ -193,10 +195,48 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
     }
   }
   const Progress progress("importing " + path);
-  const std::string bytes = imported(import_, path);
+  const std::string bytes = imported(import_, {path});
   MeshPackage package = unpack_mesh(bytes);
   if (import_.cache) store(import_.cache_folder, name, bytes);
   return taken(std::move(package), path);
+}
+
+std::shared_ptr<const Mesh> MeshLoader::divided_or_cached(const Mesh& mesh, size_t most) const {
+  const std::string solid = pack_solid(mesh);
+  const std::string name = content_key(solid) + "-" + std::to_string(most) + "-" +
+                           std::to_string(kPiecesVersion) + ".pieces";
+  const auto taken = [](const std::string& bytes) -> std::shared_ptr<const Mesh> {
+    auto pieces = std::make_shared<Mesh>(unpack_mesh(bytes).mesh);
+    return pieces->parts.empty() ? nullptr : pieces;
+  };
+  if (import_.cache) {
+    const std::string entry = import_.cache_folder + "/" + name;
+    std::error_code error;
+    if (fs::is_regular_file(entry, error)) {
+      try {
+        return taken(bytes_of(entry, kMostBytes));
+      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): divided anew, below
+      }
+    }
+  }
+  const Progress progress("dividing " + mesh.name);
+  const std::string bytes = imported(import_, {"--pieces", std::to_string(most)}, solid);
+  auto pieces = taken(bytes);
+  if (import_.cache) store(import_.cache_folder, name, bytes);
+  return pieces;
+}
+
+std::shared_ptr<const Mesh> MeshLoader::load_pieces(const std::shared_ptr<const Mesh>& mesh,
+                                                    size_t most) {
+  const auto [at, is_new] = pieces_.try_emplace({mesh.get(), most});
+  if (is_new) {
+    at->second.mesh = mesh;
+    if (import_.budget) import_.budget->take_time();
+    at->second.pieces = divided_or_cached(*mesh, most);
+    if (import_.budget && at->second.pieces)
+      import_.budget->take_mesh(bytes_of(*at->second.pieces));
+  }
+  return at->second.pieces;
 }
 
 std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {

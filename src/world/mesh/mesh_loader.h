@@ -44,6 +44,10 @@ class MeshLoader {
   std::shared_ptr<const Mesh> load_submesh(const std::string& path, const std::string& submesh,
                                            bool center);
 
+  // At most `most` convex pieces of a mesh, a part each: what convex_pieces() gives; null for none.
+  // Throws like load().
+  std::shared_ptr<const Mesh> load_pieces(const std::shared_ptr<const Mesh>& mesh, size_t most);
+
   // Reports the pictures that the materials of a mesh's file name, and that are not there.
   void name_textures_not_found(const Mesh& mesh, Findings& findings) const;
 
@@ -56,6 +60,7 @@ class MeshLoader {
     std::string fault;  // why there is no mesh
     std::vector<std::string> textures_not_found = {};
   };
+  std::shared_ptr<const Mesh> divided_or_cached(const Mesh& mesh, size_t most) const;
   Mesh import_or_cached(const std::string& path);
   Mesh taken(MeshPackage package, const std::string& path);
 
@@ -63,6 +68,10 @@ class MeshLoader {
   TextureStore& textures_;
   MeshImport import_;
   std::map<std::string, Entry> meshes_;
+  struct Pieces {
+    std::shared_ptr<const Mesh> mesh, pieces;  // kept, so that no other mesh is in its place
+  };
+  std::map<std::pair<const Mesh*, size_t>, Pieces> pieces_;  // only looked up, never iterated
   std::vector<std::string> files_;
 };
 

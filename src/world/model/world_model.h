@@ -33,7 +33,11 @@ struct Geometry {
   Vec3 normal = Vec3::UnitZ();  // plane only; the plane goes through the origin and is infinite
   Eigen::Vector2d extent{100, 100};  // plane only: the size that is drawn
   std::shared_ptr<const Mesh> mesh;  // mesh only; polylines and heightmaps are meshes too
-  Vec3 scale = Vec3::Ones();         // mesh only
+  // Mesh only: convex pieces, a Mesh::Part each, which stand for it in contacts of bodies that
+  // move. Null: the convex hulls of its connected parts are near enough, or nothing better is
+  // known.
+  std::shared_ptr<const Mesh> pieces;
+  Vec3 scale = Vec3::Ones();  // mesh only, of its pieces too
 };
 
 // Surface properties for contacts and rays.

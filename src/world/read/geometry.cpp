@@ -6,10 +6,43 @@
 namespace ruedo::world {
 namespace {
 
-std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
-                                  ReadContext& context) {
-  report_other_children(mesh, {"uri", "scale", "submesh"}, {"convex_decomposition"}, where,
+constexpr int64_t kMostPieces = 64;
+
+// How many convex pieces may stand for a mesh that moves: 1 for its hull.
+size_t most_pieces(const Element& mesh, const std::string& where, ReadContext& context) {
+  const std::string* optimization = mesh.attribute("optimization");
+  if (optimization && *optimization == "convex_hull") return 1;
+  if (optimization && !optimization->empty() && *optimization != "convex_decomposition")
+    mesh.fail("optimization='" + *optimization +
+              "' is not allowed; allowed are convex_hull and convex_decomposition");
+  const Element* decomposition = mesh.child("convex_decomposition");
+  if (!decomposition) return kMostPieces;
+  report_other_children(*decomposition, {"max_convex_hulls"}, {"voxel_resolution"}, where,
                         context.findings);
+  return static_cast<size_t>(
+      std::min(kMostPieces,
+               decomposition->integer("max_convex_hulls", kMostPieces, Allowed::between(1, 1e6))));
+}
+
+// Lets a mesh collide as convex pieces; as the hulls of its connected parts where that fails.
+void divide(Geometry& geometry, size_t most, const Element& element, const std::string& where,
+            ReadContext& context) {
+  try {
+    geometry.pieces = context.meshes.load_pieces(geometry.mesh, most);
+  } catch (const EnvironmentError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    context.findings.unsupported(
+        element.source, where,
+        std::string("the mesh cannot be divided into convex pieces: ") + error.what());
+  }
+}
+
+std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
+                                  ReadContext& context, bool collides_moving) {
+  report_other_children(mesh, {"uri", "scale", "submesh", "convex_decomposition"}, {}, where,
+                        context.findings);
+  const size_t most = most_pieces(mesh, where, context);
   Geometry geometry;
   geometry.shape = Shape::mesh;
   geometry.scale = mesh.vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor));
@@ -43,11 +76,13 @@ std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
         "the mesh '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
     return std::nullopt;
   }
+  if (collides_moving) divide(geometry, most, mesh, where, context);
   return geometry;
 }
 
 std::optional<Geometry> read_polyline(const Element& geometry_element, const Element& first,
-                                      const std::string& where, ReadContext& context) {
+                                      const std::string& where, ReadContext& context,
+                                      bool collides_moving) {
   std::vector<std::vector<Eigen::Vector2d>> polygons;
   for (const Element* polyline : geometry_element.all("polyline")) {
     std::vector<Eigen::Vector2d> polygon;
@@ -67,7 +102,10 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
     Geometry geometry;
     geometry.shape = Shape::mesh;
     geometry.mesh = std::move(mesh);
+    if (collides_moving) divide(geometry, kMostPieces, first, where, context);
     return geometry;
+  } catch (const EnvironmentError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     context.findings.error(
         first.source, where,
@@ -272,7 +310,7 @@ const Element* shape_of(const Element& element) {
 }  // namespace
 
 std::optional<Geometry> read_geometry(const Element& element, const std::string& where,
-                                      ReadContext& context) {
+                                      ReadContext& context, bool collides_moving) {
   const Element* shape = shape_of(element);
   if (!shape) return std::nullopt;
   const auto unless_too_large = [&](std::optional<Geometry> g) -> std::optional<Geometry> {
@@ -289,8 +327,9 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   if (kind == "cone") return sized.round(Shape::cone);
   if (kind == "ellipsoid") return sized.ellipsoid();
   if (kind == "plane") return sized.plane();
-  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context));
-  if (kind == "polyline") return unless_too_large(read_polyline(element, *shape, where, context));
+  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context, collides_moving));
+  if (kind == "polyline")
+    return unless_too_large(read_polyline(element, *shape, where, context, collides_moving));
   if (kind == "heightmap") return unless_too_large(read_heightmap(*shape, where, context));
   const std::string near =
       nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",

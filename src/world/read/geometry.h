@@ -10,9 +10,9 @@
 namespace ruedo::world {
 
 // Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
-// which.
+// which. collides_moving: a mesh is divided into convex pieces, as its `optimization` says.
 std::optional<Geometry> read_geometry(const Element& geometry, const std::string& where,
-                                      ReadContext& context);
+                                      ReadContext& context, bool collides_moving);
 
 // Prisms over the polygons (even-odd: a polygon inside another is a hole) from z = 0 to `height`.
 // Throws std::runtime_error for polygons without area or with crossing edges.

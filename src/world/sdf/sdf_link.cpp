@@ -357,7 +357,7 @@ void collect_plugins(const Element& element, std::vector<const Element*>& plugin
 }
 
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
-               ReadContext& context, ModelLinkIndex index,
+               ReadContext& context, bool moves, ModelLinkIndex index,
                std::vector<SensorDescription>& sensors) {
   report_other_children(element,
                         {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
@@ -381,7 +381,7 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     const std::string here = where + "/" + child.name + " " + required_name(child);
     const Element* shape = child.child("geometry");
     if (!shape) child.fail("has no <geometry>");
-    auto geometry = read_geometry(*shape, here, context);
+    auto geometry = read_geometry(*shape, here, context, moves && child.name == "collision");
     if (!geometry) return;
     const Pose pose = pose_in_link(child);
     if (child.name == "collision")

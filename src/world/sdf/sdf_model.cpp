@@ -413,7 +413,7 @@ void SdfReader::ModelReader::append_link(const Element& child) {
   };
   const ModelLinkIndex index = model_->links.next();
   Link link = read_link(child, in_link, where_ + "/link " + required_name(child), reader_.context_,
-                        index, model_->sensors);
+                        !model_->is_static, index, model_->sensors);
   link.name = dotted(link.name);
   link.X_ML = X_ML;
   if (!child.has("enable_wind")) link.wind = element_.boolean("enable_wind", false);

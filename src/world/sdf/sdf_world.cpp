@@ -301,7 +301,7 @@ Link own_shape(const Element& actor, const std::string& where, ReadContext& cont
     std::vector<SensorDescription> sensors;
     Link link = read_link(
         *written, [](const Element& owner) { return owner.pose("pose"); }, where, context,
-        ModelLinkIndex(0), sensors);
+        /*moves*/ true, ModelLinkIndex(0), sensors);
     for (Collision& each : link.collisions) {
       each.X_LC = X * each.X_LC;
       all.collisions.push_back(std::move(each));
