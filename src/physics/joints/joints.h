@@ -82,6 +82,7 @@ class JointConstraint : private JointState {
   void reset() {
     position_ = effort_ = command_ = 0.0;
     parent_position_ = 0.0;
+    follows_ = false;
     mode_ = Mode::passive;
     limits_.effort = written_.effort;
     limits_.velocity = written_.velocity;
