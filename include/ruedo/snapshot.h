@@ -6,7 +6,12 @@
 // have their size.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
+#include <iterator>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "ruedo/index.h"
@@ -25,6 +30,63 @@ struct Contact {
   Vec3 friction = Vec3::Zero();  // N on a, world, mean over the step
   double depth = 0.0;            // m, positive inside
   ShapeIndex shape_a, shape_b;   // among the links' collisions; none: not known
+};
+
+// The contacts of a state, in a fixed order: first those of bodies that move, then those between
+// bodies at rest, which consecutive states share.
+class ContactList {
+ public:
+  using Shared = std::shared_ptr<const std::vector<Contact>>;
+  class Iterator {
+   public:
+    using iterator_category = std::forward_iterator_tag;
+    using value_type = Contact;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Contact*;
+    using reference = const Contact&;
+    Iterator() = default;
+    Iterator(const ContactList& list, size_t at) : list_(&list), at_(at) {}
+    reference operator*() const { return (*list_)[at_]; }
+    pointer operator->() const { return &(*list_)[at_]; }
+    Iterator& operator++() { return ++at_, *this; }
+    Iterator operator++(int) { return {*list_, at_++}; }
+    bool operator==(const Iterator& other) const { return at_ == other.at_; }
+
+   private:
+    const ContactList* list_ = nullptr;
+    size_t at_ = 0;
+  };
+
+  ContactList() = default;
+  ContactList(std::vector<Contact> moving)  // NOLINT(google-explicit-constructor)
+      : moving_(std::move(moving)) {}
+  ContactList(std::initializer_list<Contact> moving) : moving_(moving) {}
+
+  size_t size() const { return moving_.size() + (resting_ ? resting_->size() : 0); }
+  bool empty() const { return size() == 0; }
+  const Contact& operator[](size_t i) const {
+    return i < moving_.size() ? moving_[i] : (*resting_)[i - moving_.size()];
+  }
+  const Contact& operator[](ContactIndex i) const {
+    return (*this)[static_cast<size_t>(static_cast<int>(i))];
+  }
+  Iterator begin() const { return {*this, 0}; }
+  Iterator end() const { return {*this, size()}; }
+
+  std::vector<Contact>& moving() { return moving_; }
+  const std::vector<Contact>& moving() const { return moving_; }
+  const Shared& resting() const { return resting_; }  // null: none
+  void set_resting(Shared resting) { resting_ = std::move(resting); }
+  template <class Archive>
+  void exchange(Archive& archive) {
+    std::vector<Contact> resting = resting_ ? *resting_ : std::vector<Contact>();
+    archive(moving_, resting);
+    if (archive.reads()) resting_ = std::make_shared<const std::vector<Contact>>(std::move(resting));
+  }
+
+ private:
+  std::vector<Contact> moving_;
+  Shared resting_;
 };
 
 // A contact of a robot with what it runs into: with something that is no part of it, that does not
@@ -76,8 +138,15 @@ struct Snapshot {
   IndexedVector<JointIndex, double> joint_efforts;
   IndexedVector<RobotIndex, RobotState> robots;
   std::vector<MotionEnd> motion_ends;  // by robot, then in the order of the commands
-  std::vector<Contact> contacts;       // in a fixed order
+  ContactList contacts;
   std::vector<Collision> collisions;   // by robot, then in the order of the contacts
+  // Bodies that may differ from those of the state before, in order.
+  std::vector<BodyIndex> moving;
+  // Of which world these are the bodies and joints, and its state: what read them knows what has
+  // changed since, and need not read the rest again.
+  struct Source {
+    uint64_t world = 0, state = 0;
+  } source;
 };
 
 }  // namespace ruedo

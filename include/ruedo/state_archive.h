@@ -140,7 +140,8 @@ class StateArchive {
     (*this)(state.step, state.time, state.wind, state.bodies, state.body_twists,
             state.body_accelerations, state.wheel_angles, state.wheel_rates, state.joint_positions,
             state.joint_velocities, state.joint_efforts, state.robots, state.motion_ends,
-            state.contacts, state.collisions);
+            state.contacts, state.collisions, state.moving);
+    if (reads_) state.source = {};
   }
   void put(std::string& text) {
     text.resize(length(text.size()));

@@ -16,7 +16,7 @@ void PhysicsWorld::Impl::take(const Impl& other) {
   motions_ = other.motions_;
   for (BodyMotion& motion : motions_) motion.listed = false;
   busy_.clear();
-  stir_all();
+  renew();
   contacts_ = other.contacts_;
   tied_ = other.tied_;
   wind_ = other.wind_;
@@ -107,7 +107,7 @@ void PhysicsWorld::Impl::exchange(StateArchive& archive) {
     bullet(i).forceActivationState(rests[i].first);
     bullet(i).setDeactivationTime(rests[i].second);
   }
-  if (archive.reads()) stir_all();
+  if (archive.reads()) renew();
 }
 
 std::vector<btTypedConstraint*> PhysicsWorld::Impl::numbered_constraints() {

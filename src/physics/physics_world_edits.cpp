@@ -67,6 +67,7 @@ void PhysicsWorld::Impl::add(InstanceIndex instance) {
   }
   if (has_statics) refilter_all();
   list_joints();
+  renew();
 }
 
 // Resets it to a new body at the layout's pose.

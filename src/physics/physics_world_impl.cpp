@@ -124,7 +124,8 @@ PhysicsWorld::Impl::Impl(const world::WorldModel& world, const world::BodyLayout
     if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
   list_joints();
-  stir_all();
+  for (auto* list : {&busy_, &considered_, &spreading_}) list->reserve(2 * n);
+  renew();
 }
 
 void PhysicsWorld::Impl::refuse_crowded(BodyIndex body, int64_t most, const char* how) const {
@@ -334,6 +335,13 @@ void PhysicsWorld::Impl::stir(BodyIndex body) {
 
 void PhysicsWorld::Impl::stir_all() {
   for (const BodyIndex i : motions_.indices()) stir(i);
+}
+
+// The state was replaced by another one.
+void PhysicsWorld::Impl::renew() {
+  stir_all();
+  any_fresh_ = true;
+  changes_.forget(motions_.size());
 }
 
 JointConstraint& PhysicsWorld::Impl::stirred(JointIndex joint) {
@@ -643,6 +651,9 @@ void PhysicsWorld::Impl::step() {
     motion.kind = BodyMotion::Kind::free;
     motion.fresh = false;
   }
+  any_fresh_ = false;
+  considered_.insert(considered_.end(), busy_.begin(), busy_.end());
+  changes_.add_state(considered_);
 }
 
 // Forces that are all allowed can together accelerate a light body without bound, and fast bodies
@@ -704,30 +715,49 @@ void PhysicsWorld::Impl::turn_accelerations(Snapshot& snapshot) const {
   }
 }
 
-void PhysicsWorld::Impl::read(Snapshot& snapshot) {
+void PhysicsWorld::Impl::read_body(BodyIndex i, Snapshot& snapshot) const {
   const double step_s = static_cast<double>(step_us_) * 1e-6;
-  snapshot.bodies = poses_;
-  snapshot.body_twists = twists_;
-  snapshot.body_accelerations.resize(twists_.size());
-  for (const BodyIndex i : twists_.indices()) {
-    snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
-    if (motions_[i].fresh && !motions_[i].tied && !mechanism_in_the_air(i).empty())
-      snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
-  }
-  turn_accelerations(snapshot);
-  accelerate_at_start(snapshot);
+  snapshot.bodies[i] = poses_[i];
+  snapshot.body_twists[i] = twists_[i];
+  snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
+  if (motions_[i].fresh && !motions_[i].tied && !mechanism_in_the_air(i).empty())
+    snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
+  for (const JointIndex joint : joints_of_[i]) read_joint(joint, snapshot);
+}
+
+void PhysicsWorld::Impl::read_joint(JointIndex i, Snapshot& snapshot) const {
+  snapshot.joint_positions[i] = joints_[i].position();
+  snapshot.joint_velocities[i] = joints_[i].velocity();
+  snapshot.joint_efforts[i] = joints_[i].effort();
+}
+
+void PhysicsWorld::Impl::read(Snapshot& snapshot) {
+  snapshot.bodies.resize(poses_.size());
+  snapshot.body_twists.resize(poses_.size());
+  snapshot.body_accelerations.resize(poses_.size());
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());
   snapshot.joint_efforts.resize(joints_.size());
-  for (const JointIndex i : joints_.indices()) {
-    snapshot.joint_positions[i] = joints_[i].position();
-    snapshot.joint_velocities[i] = joints_[i].velocity();
-    snapshot.joint_efforts[i] = joints_[i].effort();
+  const bool known = changes_.for_each_since(
+      snapshot.source, [&](BodyIndex body) { read_body(body, snapshot); });
+  if (known) {
+    for (const BodyIndex body : busy_) read_body(body, snapshot);  // also changed since the step
+  } else {
+    for (const BodyIndex i : poses_.indices()) read_body(i, snapshot);
+    for (const JointIndex i : joints_.indices()) read_joint(i, snapshot);
   }
-  snapshot.contacts.reserve(contacts_.room());
-  snapshot.contacts = contacts_.all();
-  snapshot.contacts.insert(snapshot.contacts.end(), contacts_.at_rest().begin(),
-                           contacts_.at_rest().end());
+  snapshot.source = changes_.source();
+  snapshot.moving.reserve(3 * poses_.size());
+  snapshot.moving = considered_;  // the last step's, and what was changed since
+  snapshot.moving.insert(snapshot.moving.end(), busy_.begin(), busy_.end());
+  std::sort(snapshot.moving.begin(), snapshot.moving.end());
+  snapshot.moving.erase(std::unique(snapshot.moving.begin(), snapshot.moving.end()),
+                        snapshot.moving.end());
+  turn_accelerations(snapshot);
+  if (any_fresh_) accelerate_at_start(snapshot);
+  snapshot.contacts.moving().reserve(contacts_.room());
+  snapshot.contacts.moving() = contacts_.all();
+  snapshot.contacts.set_resting(contacts_.at_rest());
 }
 
 }  // namespace ruedo::physics

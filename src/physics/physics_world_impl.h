@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "physics/base/rigid_bodies.h"
+#include "physics/changes.h"
 #include "physics/collision/broadphase.h"
 #include "physics/collision/contact_book.h"
 #include "physics/collision/detection.h"
@@ -153,6 +154,7 @@ class PhysicsWorld::Impl {
   void update_box(BodyIndex body);
   void list_joints();
   void stir_all();
+  void renew();
   bool stirs(BodyIndex body) const;
   void find_busy();
   void choose_simulated();
@@ -161,6 +163,8 @@ class PhysicsWorld::Impl {
   std::vector<BodyIndex> mechanism_in_the_air(BodyIndex body) const;
   Vec3 velocity_now(BodyIndex body) const;
   void fall_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot) const;
+  void read_body(BodyIndex body, Snapshot& snapshot) const;
+  void read_joint(JointIndex joint, Snapshot& snapshot) const;
   void turn_accelerations(Snapshot& snapshot) const;
   void accelerate_at_start(Snapshot& snapshot);
   void accelerate_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot);
@@ -185,6 +189,8 @@ class PhysicsWorld::Impl {
   // that the next one considers, in any order. What sleeps together is not among them.
   std::vector<BodyIndex> busy_;
   std::vector<BodyIndex> considered_, spreading_;                // scratch
+  Changes changes_;
+  bool any_fresh_ = true;  // a body may be
   IndexedVector<BodyIndex, std::vector<JointIndex>> joints_of_;  // those that move it
   IndexedVector<BodyIndex, std::vector<WheelJointIndex>> wheels_of_;
   std::vector<JointIndex> busy_joints_[2];  // for each substep length, in order

@@ -33,7 +33,7 @@ std::string joint_name(size_t joint, const world::WorldModel& world,
 
 void check_finite(const Snapshot& snapshot, const world::WorldModel& world,
                   const world::BodyLayout& layout) {
-  for (size_t i = 0; i < snapshot.bodies.size(); ++i) {
+  for (const BodyIndex i : snapshot.moving) {
     const Vec3& acceleration = snapshot.body_accelerations[i];
     if (!finite(snapshot.bodies[i]) || !finite(snapshot.body_twists[i]) ||
         !std::isfinite(acceleration.sum())) {
@@ -56,7 +56,7 @@ void check_finite(const Snapshot& snapshot, const world::WorldModel& world,
     if (!std::isfinite(snapshot.wheel_angles[i] + snapshot.wheel_rates[i]))
       fail(snapshot, "wheel " + std::to_string(i));
   }
-  for (const Contact& contact : snapshot.contacts) {
+  for (const Contact& contact : snapshot.contacts.moving()) {
     if (!std::isfinite(contact.position.sum() + contact.normal.sum() + contact.force +
                        contact.depth)) {
       const BodyIndex body = contact.body_a.valid() ? contact.body_a : contact.body_b;

@@ -53,6 +53,8 @@ class Robots::Impl {
   void put(BodyIndex body, const Pose& X_WB);
   void end_put(InstanceIndex instance);
   void read_driveless(RobotIndex robot, RobotState& state) const;
+  void add_collisions(const std::vector<Contact>& contacts, size_t first, const Snapshot& snapshot,
+                      std::vector<Collision>& collisions) const;
   void read_collisions(Snapshot& snapshot) const;
   void number_robots();
   SimTime now() const { return step_ * world_.step_us; }
@@ -70,6 +72,8 @@ class Robots::Impl {
   Surroundings surroundings_;
   JointControl joints_;
   Wind wind_;
+  mutable ContactList::Shared resting_;  // contacts of the last read(), and their collisions
+  mutable std::vector<Collision> resting_collisions_;
 };
 
 Robots::Impl::Impl(const world::WorldModel& world, const world::BodyLayout& layout,
@@ -164,6 +168,7 @@ void Robots::Impl::take(const Impl& other) {
   surroundings_ = other.surroundings_;
   joints_ = other.joints_;
   wind_ = other.wind_;
+  resting_ = nullptr;
 }
 
 void Robots::Impl::exchange(StateArchive& archive) {
@@ -173,6 +178,7 @@ void Robots::Impl::exchange(StateArchive& archive) {
   archive.each(driveless_);
   for (auto& mover : movers_) archive(*mover);
   archive(crowd_, surroundings_, joints_);
+  resting_ = nullptr;
 }
 
 void Robots::Impl::read(Snapshot& snapshot) const {
@@ -203,26 +209,45 @@ void Robots::Impl::number_robots() {
   robot_of_link_.clear();
   for (const world::LinkPlacement& link : layout_.links)
     robot_of_link_.push_back(of_instance[link.instance]);
+  resting_ = nullptr;
 }
 
-void Robots::Impl::read_collisions(Snapshot& snapshot) const {
-  snapshot.collisions.clear();
-  snapshot.collisions.reserve(2 * snapshot.contacts.capacity());  // avoids allocations in the run
+void Robots::Impl::add_collisions(const std::vector<Contact>& contacts, size_t first,
+                                  const Snapshot& snapshot,
+                                  std::vector<Collision>& collisions) const {
   const auto robot_of_link = [this](LinkIndex link) {
     return link.valid() ? robot_of_link_[link] : RobotIndex();
   };
-  for (size_t i = 0; i < snapshot.contacts.size(); ++i) {
-    const Contact& contact = snapshot.contacts[i];
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& contact = contacts[i];
     const RobotIndex a = robot_of_link(contact.link_a), b = robot_of_link(contact.link_b);
     if (a == b) continue;  // no robot involved, or links of the same robot
     const auto add = [&](RobotIndex robot, bool as_a) {
       if (!robot.valid()) return;
       const Vec3 up = snapshot.robots[robot].X_WBase.rotation * Vec3::UnitZ();
       if (std::abs(contact.normal.dot(up)) < kSupportNormal)
-        snapshot.collisions.push_back({robot, ContactIndex(i), as_a});
+        collisions.push_back({robot, ContactIndex(first + i), as_a});
     };
     add(a, true);
     add(b, false);
+  }
+}
+
+// What rests keeps its collisions.
+void Robots::Impl::read_collisions(Snapshot& snapshot) const {
+  const ContactList& contacts = snapshot.contacts;
+  snapshot.collisions.clear();
+  // avoids allocations in the run
+  snapshot.collisions.reserve(2 * contacts.moving().capacity());
+  add_collisions(contacts.moving(), 0, snapshot, snapshot.collisions);
+  if (resting_ != contacts.resting()) {
+    resting_ = contacts.resting();
+    resting_collisions_.clear();
+    add_collisions(*resting_, 0, snapshot, resting_collisions_);
+  }
+  for (const Collision& each : resting_collisions_) {
+    const int contact = static_cast<int>(contacts.moving().size()) + each.contact;
+    snapshot.collisions.push_back({each.robot, ContactIndex(contact), each.as_a});
   }
   std::sort(snapshot.collisions.begin(), snapshot.collisions.end(),
             [](const Collision& one, const Collision& other) {

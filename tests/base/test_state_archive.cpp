@@ -37,7 +37,7 @@ Kept example() {
   kept.name = "a name";
   kept.names = {"one", "two"};
   kept.state.step = 9;
-  kept.state.contacts.resize(3);
+  kept.state.contacts.moving().resize(3);
   kept.state.robots.resize(1);
   return kept;
 }

@@ -357,13 +357,13 @@ TEST(Distances, AContactIsATouch) {
   contact.link_a = robot.link("p3at/front_left_wheel");
   contact.link_b = robot.link("ground/l");
   contact.position = {0.135, 0.197, 0.0};
-  robot.snapshot.contacts.push_back(contact);
+  robot.snapshot.contacts.moving().push_back(contact);
   EXPECT_EQ(robot.nearest(0.5).distance, kInfinite);
   contact.link_a = robot.link("wall/l");
   contact.link_b = robot.link("p3at/base_link");
   contact.normal = Vec3::UnitX();
   contact.position = {2.95, 0, 0.2};
-  robot.snapshot.contacts.push_back(contact);
+  robot.snapshot.contacts.moving().push_back(contact);
   const Nearest nearest = robot.nearest(0.0);
   EXPECT_EQ(nearest.distance, 0.0);
   EXPECT_EQ(robot.name(nearest.own), "p3at/base_link");

@@ -60,8 +60,8 @@ TEST(StateCheck, NamesWhatIsNotFinite) {
   EXPECT_THAT(error_with([](Snapshot& s) { s.joint_efforts[0] = kInfinity; }),
               HasSubstr("the joint 'm/j'"));
   EXPECT_THAT(error_with([](Snapshot& s) {
-                s.contacts.push_back({}), s.contacts.back().body_b = BodyIndex(1),
-                                          s.contacts.back().force = kNaN;
+                s.contacts.moving().push_back({}), s.contacts.moving().back().body_b = BodyIndex(1),
+                                          s.contacts.moving().back().force = kNaN;
               }),
               HasSubstr("a contact of the body 'm/b'"));
 }

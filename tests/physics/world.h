@@ -11,6 +11,19 @@
 
 namespace ruedo::physics::testing {
 
+// CPU time of the caller's thread for doing that so many times.
+template <class Do>
+double seconds_of(Do&& act, int times) {
+  const auto now = [] {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  };
+  const double begin = now();
+  for (int i = 0; i < times; ++i) act();
+  return now() - begin;
+}
+
 class World {
  public:
   // solver: the content of <bullet>.
@@ -27,6 +40,10 @@ class World {
   void run(double seconds) {
     const auto steps = static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us;
     for (int64_t i = 0; i < steps; ++i) physics.step();
+  }
+  // CPU time of that many steps.
+  double seconds_of(int steps) {
+    return testing::seconds_of([this] { physics.step(); }, steps);
   }
   BodyIndex body(const std::string& name) const {
     for (const BodyIndex i : layout.bodies.indices()) {
@@ -46,18 +63,6 @@ class World {
     return options;
   }
 };
-
-// CPU time of the caller's thread for that many steps.
-inline double seconds_of(World& world, int steps) {
-  const auto now = [] {
-    timespec time{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  };
-  const double begin = now();
-  for (int i = 0; i < steps; ++i) world.physics.step();
-  return now() - begin;
-}
 
 inline const std::string kPlane =
     "<model name='ground'><static>true</static><link name='l'><collision "

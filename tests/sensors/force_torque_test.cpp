@@ -133,9 +133,9 @@ TEST(ForceTorque, ContactsTakeTheirPart) {
   contact.friction = {0, 1, 0};
   bench.now.contacts = {contact};
   expect(bench.samples().at(0), {0, 1, -3 * kG + 4}, {0, 2 * kG - 4, 1});
-  std::swap(bench.now.contacts[0].link_a, bench.now.contacts[0].link_b);
-  bench.now.contacts[0].normal = {0, 0, -1};
-  bench.now.contacts[0].friction = {0, -1, 0};
+  std::swap(bench.now.contacts.moving()[0].link_a, bench.now.contacts.moving()[0].link_b);
+  bench.now.contacts.moving()[0].normal = {0, 0, -1};
+  bench.now.contacts.moving()[0].friction = {0, -1, 0};
   expect(bench.samples(1).at(0), {0, 1, -3 * kG + 4}, {0, 2 * kG - 4, 1});
 }
 

@@ -160,7 +160,7 @@ class CollisionsOf : public ::testing::Test {
   void step(const std::vector<std::string>& others, bool due = false, double force = 1.0) {
     ++now_.step;
     now_.time += 5000;
-    now_.contacts.clear();
+    now_.contacts = {};
     now_.collisions.clear();
     for (const std::string& other : others) {
       Contact contact;
@@ -171,7 +171,7 @@ class CollisionsOf : public ::testing::Test {
       contact.force = force;
       contact.depth = 0.25;
       now_.collisions.push_back({RobotIndex(0), ContactIndex(now_.contacts.size()), true});
-      now_.contacts.push_back(contact);
+      now_.contacts.moving().push_back(contact);
     }
     test::step(device_, now_, out_, due ? 1 : -1);
   }

@@ -82,7 +82,7 @@ TEST(Touch, TellsOnceWhenTheTargetWasTouchedForLonger) {
   ASSERT_EQ(told[0].n, 1);
   EXPECT_EQ(told[0].points[0].body, "green/link");
   EXPECT_THAT(bench.step(), IsEmpty());
-  bench.now.contacts.clear();
+  bench.now.contacts = {};
   const auto later = bench.step(true);
   ASSERT_EQ(later.size(), 1u);
   EXPECT_TRUE(later[0].pressed);  // for who comes later
@@ -94,7 +94,7 @@ TEST(Touch, BeginsAnewAfterABreak) {
   for (int i = 0; i < 3; ++i) {
     bench.now.contacts = {touch(kGreen, kFoot)};
     for (int n = 0; n < 3; ++n) EXPECT_THAT(bench.step(), IsEmpty());
-    bench.now.contacts.clear();
+    bench.now.contacts = {};
     EXPECT_THAT(bench.step(), IsEmpty());
   }
 }

@@ -38,7 +38,7 @@ class ContactBook {
 
   // Those with a force.
   const std::vector<Contact>& all() const { return contacts_; }
-  const std::vector<Contact>& at_rest() const { return *resting_; }
+  const std::shared_ptr<const std::vector<Contact>>& at_rest() const { return resting_; }
   // Contacts are grouped by body only once somebody asks.
   std::span<const Contact> touching(BodyIndex body) {
     return of(body, touching_, contacts_, resting_touching_, *resting_);

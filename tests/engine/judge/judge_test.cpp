@@ -79,7 +79,7 @@ class JudgeTest : public testing::Test {
     state_.robots[RobotIndex(0)].X_WBase.translation = {x, y, 0.0};
     state_.bodies[body_].translation = {x, y, 0.0};
     judge_->see(state_);
-    state_.contacts.clear();
+    state_.contacts = {};
   }
   void touch(LinkIndex a, LinkIndex b, const Vec3& position, const Vec3& normal) {
     Contact contact;
@@ -87,7 +87,7 @@ class JudgeTest : public testing::Test {
     contact.link_b = b;
     contact.position = position;
     contact.normal = normal;
-    state_.contacts.push_back(contact);
+    state_.contacts.moving().push_back(contact);
   }
   template <class Body>
   void ask(int32_t kind, const Body& body, const std::string& channel = kRequestChannel) {
