@@ -94,11 +94,31 @@ def test_colcon_installs_each_file(monkeypatch):
     assert files == {*there, "package.xml"}
 
 
-def test_everything_is_launched(launch):
+def read_once(name):
+    text = Path(name).read_text(encoding="utf-8")
+    Path(name).unlink()
+    return yaml.safe_load(text)
+
+
+@pytest.mark.parametrize("namespace, use_namespace", [("", "False"), ("alice", "True")])
+def test_everything_is_launched(launch, nav2, namespace, use_namespace):
     launch.generate_launch_description()
-    launch.LaunchConfiguration.return_value.perform.return_value = "p3at"
-    assert len(launch.bring_up(MagicMock())) == 2
-    assert launch.RewrittenYaml.call_args.kwargs["param_rewrites"]["robot_radius"] == "0.38"
+    values = {"map": "arena.yaml", "slam": "False", "robot": "p3at", "namespace": namespace}
+    launch.LaunchConfiguration.side_effect = lambda name: MagicMock(
+        perform=lambda context: values[name]
+    )
+    launch.FindPackageShare.return_value.perform.return_value = str(nav2.parents[1])
+    assert len(launch.bring_up(MagicMock())) == 3
+    started = [
+        dict(call.kwargs["launch_arguments"])
+        for call in launch.IncludeLaunchDescription.call_args_list[-2:]
+    ]
+    assert all(one["use_namespace"] == use_namespace for one in started)
+    all_nodes = launch.parameters(nav2, "p3at")
+    assert read_once(started[0]["params_file"]) == all_nodes
+    if namespace:  # in which "slam_toolbox" alone would be another node
+        [call] = launch.SetParametersFromFile.call_args_list
+        assert read_once(call.args[0]) == {"/**/slam_toolbox": all_nodes["slam_toolbox"]}
 
 
 @pytest.mark.parametrize("world, spawned", [("arena", []), ("empty", ["--spawn", "turtle@0,0"])])
@@ -164,17 +184,44 @@ def test_rviz_shows_topics_of_the_robot(robot):
 
 
 @pytest.mark.parametrize("robot", ["p3at", "turtle"])
-def test_parameters_are_the_robots(launch, robot):
-    told = {name: float(value) for name, value in launch.rewrites(robot).items()}
-    model = SOURCE / f"worlds/robots/{robot}/model.sdf"
-    info = subprocess.run(
-        [RUEDO, "info", model], stdout=subprocess.PIPE, text=True, timeout=120, check=True
+def test_parameters_are_the_robots(robot):
+    """After a change of the robot: `ruedo nav2-params ROBOT > config/ROBOT.yaml`."""
+    made = subprocess.run(
+        [RUEDO, "nav2-params", robot], stdout=subprocess.PIPE, text=True, timeout=120, check=True
     ).stdout
-    speed, turn = re.search(r"drive, ([\d.]+) m/s, ([\d.]+) rad/s", info).groups()
-    assert told["controller_server.ros__parameters.FollowPath.vx_max"] == float(speed)
-    assert told["controller_server.ros__parameters.FollowPath.wz_max"] == float(turn)
-    assert told["behavior_server.ros__parameters.max_rotational_vel"] == float(turn)
-    assert 0.1 < told["robot_radius"] < 0.5
+    assert (PACKAGE / f"config/{robot}.yaml").read_text(encoding="utf-8") == made
+
+
+NAV2 = """
+controller_server: {ros__parameters: {failure_tolerance: 0.3, FollowPath: {vx_max: 0.5, critics: [CostCritic]}}}
+local_costmap: {local_costmap: {ros__parameters: {robot_radius: 0.22, width: 3}}}
+global_costmap: {global_costmap: {ros__parameters: {robot_radius: 0.22}}}
+map_saver: {ros__parameters: {save_map_timeout: 5.0}}
+"""
+
+
+@pytest.fixture
+def nav2(tmp_path):
+    (tmp_path / "params").mkdir()
+    file = tmp_path / "params/nav2_params.yaml"
+    file.write_text(NAV2, encoding="utf-8")
+    return file
+
+
+def test_parameters_of_nav2_keep_what_the_robot_does_not_change(launch, nav2):
+    told = launch.parameters(nav2, "p3at")
+    controller = told["controller_server"]["ros__parameters"]
+    assert controller["failure_tolerance"] == 0.3
+    assert controller["FollowPath"]["critics"] == ["CostCritic"]
+    assert controller["FollowPath"]["vx_max"] == 0.6
+    local = told["local_costmap"]["local_costmap"]["ros__parameters"]
+    assert local["width"] == 3 and "robot_radius" not in local and "footprint" in local
+    assert told["map_saver"]["ros__parameters"] == {"save_map_timeout": 5.0}
+    slam = told["slam_toolbox"]["ros__parameters"]
+    assert slam["scan_topic"] == "/scan" and slam["loop_match_minimum_chain_size"] == 10
+    round_one = launch.parameters(nav2, str(PACKAGE / "config/turtle.yaml"))
+    local = round_one["local_costmap"]["local_costmap"]["ros__parameters"]
+    assert local["robot_radius"] == 0.17 and "footprint" not in local
 
 
 def test_slam_toolbox_reads_ruedos_frames():
