@@ -5,25 +5,32 @@ from __future__ import annotations
 import numpy as np
 from ruedo.engine import Engine
 
-LEGS = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (0.8, 0.7), (0.8, -0.7))
+SQUARE = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, -1.0))
+LEGS = (*SQUARE, (0.8, 0.7), (0.8, -0.7))
+_HEAVY = ("camera", "sonar")
 
 
 def drive(
-    file, robot, settings, seed, *, world="empty", place="0,0", legs=48, speeds=(0.4, 0.6), name=""
-):
+    file, robot, settings, seed, *,
+    world="empty", place="0,0", legs=48, speeds=(0.4, 0.6), name="", course=LEGS, off=_HEAVY,
+):  # fmt: skip
     """Writes a log. settings: of devices, without the robot's name. speeds: m/s, rad/s. name: of
-    the robot, where `robot` is a file.
+    the robot, where `robot` is a file. off: kinds of devices that are left out. Returns in how many
+    states the robot touched something.
     """
     rng = np.random.default_rng(seed)
     every = {f"{name or robot}/{key}": value for key, value in settings.items()}
     spawn = [f"{robot}@{place}"] if place else []  # or the world has the robot
     with Engine(world, spawn=spawn, seed=seed, set=every) as first:
-        off = [f"{a}/{b}" for a, b, kind in first.devices if kind in ("camera", "sonar")]
-    with Engine(world, spawn=spawn, seed=seed, set=every, disable=off) as engine:
+        less = [f"{a}/{b}" for a, b, kind in first.devices if kind in off]
+    touched = 0
+    with Engine(world, spawn=spawn, seed=seed, set=every, disable=less) as engine:
         engine.begin_run(seed, log=str(file), everything=True)
         quarter = round(0.25 / engine.dt)
         for leg in range(legs):
-            command = np.array(LEGS[leg % len(LEGS)]) * speeds
+            command = np.array(course[leg % len(course)]) * speeds
             for _ in range(int(rng.uniform(12, 32))):
                 engine.step(command, quarter)
+                touched += int(engine.touching().sum())
         engine.end_run()
+    return touched

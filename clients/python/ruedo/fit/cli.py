@@ -56,6 +56,12 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument(
         "--of", metavar="NAME", default="", help="of an LCM log with several robots: which"
     )
+    one.add_argument(
+        "--mount",
+        type=_mount,
+        metavar="X,Y,YAW",
+        help="of the range finder on the robot, m and rad (default: as in the model)",
+    )
     one.add_argument("-o", "--output", metavar="FILE", help="the fitted model, SDF")
     one.add_argument("--report", metavar="FILE", help="an HTML page with plots")
     one.add_argument("--json", action="store_true", help="print the values as JSON")
@@ -149,7 +155,7 @@ def _fit(arguments: argparse.Namespace) -> int:
             raise UsageError(f"{named}: its folder does not exist")
     robot = read_robot(arguments.robot) if arguments.robot else None
     recordings = [read(one, arguments.of) for one in arguments.LOG]
-    answer = fit(recordings, robot)
+    answer = fit(recordings, robot, arguments.mount)
     if arguments.output:
         assert robot is not None
         save(answer, robot, File(arguments.output))

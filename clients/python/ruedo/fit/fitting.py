@@ -18,6 +18,7 @@ from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal
 from .odometry import OdometryFit, fit_odometry
+from .rangefinder import BeamModel, fit_rangefinder
 from .recording import Array, Geometry, Recording, body_steps
 from .robot_file import Setting, write_fitted
 
@@ -78,6 +79,7 @@ class Fit:
     settings: list[Setting] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     odometry: OdometryFit | None = None
+    beams: BeamModel | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """For --json: {part: [{name, value, low, high, unit, why}]}."""
@@ -106,12 +108,21 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def fit(recordings: Sequence[Recording], robot: Robot | None = None) -> Fit:
-    """Everything that the logs determine. Raises FitError where that is nothing."""
+def fit(
+    recordings: Sequence[Recording],
+    robot: Robot | None = None,
+    mount: Sequence[float] | None = None,
+) -> Fit:
+    """Everything that the logs determine. mount: x, y (m), heading (rad) of the range finder on the
+    robot; None: the model's, or the origin where the log gives the range finder's own poses. Raises
+    FitError where that is nothing.
+    """
     answer = Fit(list(recordings))
     for one in recordings:
         answer.remarks += [f"{one.file}: {finding}" for finding in one.findings]
     _fit_drive(answer, robot)
+    if any(one.scans is not None for one in recordings):
+        _fit_scans(answer, robot, mount)
     if not answer.parts:
         raise FitError("; ".join(answer.remarks))
     return answer
@@ -137,6 +148,54 @@ def _fit_drive(answer: Fit, robot: Robot | None) -> None:
     answer.parts["Odometry"] = found.estimates
     if geometry.kind == "differential" and robot is not None:
         _drive_settings(answer, found, robot)
+
+
+def _fit_scans(answer: Fit, robot: Robot | None, mount: Sequence[float] | None) -> None:
+    recording = next(one for one in answer.recordings if one.scans is not None)
+    assert recording.scans is not None
+    device = None if robot is None else _rangefinder(robot, recording.scans.ranges.shape[1])
+    place = np.zeros(3) if mount is None else np.asarray(mount, float)
+    if mount is None and device is not None and recording.scans.pose is None:
+        w, x, y, z = device["orientation"]
+        heading = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        place = np.array([*device["position"][:2], heading])
+    try:
+        model, estimates = fit_rangefinder([recording], place)
+    except FitError as error:
+        answer.remarks.append(f"the range finder is not fitted: {error}")
+        return
+    answer.parts["Range finder"] = estimates
+    answer.beams = model
+    if robot is None:
+        return
+    if device is None:
+        answer.remarks.append(
+            f"{robot.file}: no range finder with {recording.scans.ranges.shape[1]} rays; the scans' "
+            "values are reported and not written"
+        )
+        return
+    sensor = f"sensor[{device['name']}]"
+    source = f"fitted to {recording.file.name}, 95 %: "
+    kind = "lidar" if "<lidar>" in robot.file.read_text(encoding="utf-8") else "ray"
+    paths = {
+        "range noise": [f"{sensor}/{kind}/noise/stddev", f"{sensor}/{kind}/noise/type"],
+        "bearing noise": [f"{sensor}/ruedo:bearing_noise"],
+        "resolution": [f"{sensor}/{kind}/range/resolution"],
+    }
+    for one in estimates:
+        if one.value is None or one.name not in paths:
+            continue
+        interval = f"{one.low:.5g} to {one.high:.5g}" if math.isfinite(one.low) else one.why
+        for path in paths[one.name]:
+            value = "gaussian" if path.endswith("type") else f"{one.value:.5g}"
+            answer.settings.append(Setting(path, value, source + interval))
+
+
+def _rangefinder(robot: Robot, rays: int) -> dict[str, Any] | None:
+    """The robot's planar range finder with so many rays, or its only one."""
+    every = [one for one in robot.devices if one["kind"] == "lrf"]
+    fitting = [one for one in every if one["width"] == rays]
+    return fitting[0] if fitting else every[0] if len(every) == 1 else None
 
 
 def believed_measures(recording: Recording, geometry: Geometry) -> Array:

@@ -1,0 +1,70 @@
+"""Noise of range and bearing against known truth: made readings, and Ruedo's own."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from conftest import ruedo
+from drives import drive
+from ruedo.fit import FitError, read
+from ruedo.fit.rangefinder import Residuals, fit_beams, fit_rangefinder
+from test_import import room_scan
+from test_readers import flaser
+
+
+def test_beam_model_of_drawn_residuals():
+    """Both sigmas, the bias and the outliers' share, of readings drawn from the model itself."""
+    rng = np.random.default_rng(4)
+    reach, incidence = rng.uniform(1, 8, 20_000), rng.uniform(0, 1.2, 20_000)
+    sigma = np.hypot(0.01, 0.002 * reach * np.tan(incidence))
+    residual = 0.004 + sigma * rng.normal(size=20_000)
+    others = rng.random(20_000) < 0.05
+    residual[others] = rng.uniform(-0.3, 0.3, others.sum())
+    model, std = fit_beams(Residuals(residual, reach, incidence, 1.0))
+    assert model.range_sigma == pytest.approx(0.01, rel=0.05)
+    assert model.bearing_sigma == pytest.approx(0.002, rel=0.05)
+    assert model.bias == pytest.approx(0.004, abs=5e-4)
+    assert model.outliers == pytest.approx(0.05, abs=0.01)
+    assert (std < 0.03).all()
+
+
+def test_room_of_exact_walls(tmp_path):
+    """Made scans of a square room: 20 mm on the range alone."""
+    rng = np.random.default_rng(6)
+    log = tmp_path / "room.log"
+    lines = []
+    for i in range(80):
+        pose = (-1 + i / 40, 0.3 * math.sin(i), i * 0.2)
+        ranges = np.array(room_scan(pose)) + 0.02 * rng.normal(size=181)
+        lines.append(flaser([f"{one:.4f}" for one in ranges], pose, float(i)))
+    log.write_text("".join(lines))
+    _, found = fit_rangefinder([read(log)], np.zeros(3))
+    noise = next(one for one in found if one.name == "range noise")
+    assert noise.value == pytest.approx(0.02, rel=0.05)
+    said = {one.name: one for one in found}
+    assert said["bias of the range"].value is None  # surfaces are made of the same readings
+
+
+def test_known_truth_of_ruedo(tmp_path):
+    log, out = tmp_path / "drive.lcm", tmp_path / "fitted.sdf"
+    true = {"lrf.lidar.noise.stddev": 0.012, "lrf.bearing_noise": 0.003}
+    drive(log, "p3at", true, seed=2, world="rooms", place="", legs=24, speeds=(0.1, 0.6))
+    said, _ = ruedo("fit", log, "--robot", "p3at", "-o", out, "--json")
+    answer = json.loads(said)
+    found = {one["name"]: one for one in answer["parts"]["Range finder"]}
+    assert found["range noise"]["value"] == pytest.approx(0.012, rel=0.05)
+    assert found["bearing noise"]["value"] == pytest.approx(0.003, rel=0.15)
+    assert found["resolution"]["value"] == 0.001
+    text = out.read_text()
+    assert f"<stddev>{found['range noise']['value']:.5g}</stddev>  <!-- fitted to drive.lcm" in text
+    assert "good" in ruedo("check", out)[0]
+
+
+def test_one_place_is_too_little(tmp_path):
+    log = tmp_path / "room.log"
+    log.write_text("".join(flaser(room_scan((0, 0, 0)), (0, 0, 0), t) for t in range(9)))
+    with pytest.raises(FitError, match="scans from 1 places; a drive is needed"):
+        fit_rangefinder([read(log)], np.zeros(3))
