@@ -4,6 +4,8 @@ are in NumPy.
 """
 
 import importlib
+import json
+import subprocess
 import sys
 import types
 
@@ -133,6 +135,7 @@ def test_other_libraries_take_arrays_without_a_copy():
     """By DLPack: observations are the caller's own, and the engine's views cannot be written to."""
     envs = ruedo.gym.NavigateVectorEnv(4, beams=6)
     first, _ = envs.reset(seed=1)
+    assert first.ctypes.data % 64 == 0  # or JAX copies
     taken = np.from_dlpack(first)
     assert np.shares_memory(taken, first) and first.flags.writeable and first.flags.c_contiguous
     kept = first.copy()
@@ -185,3 +188,27 @@ def test_calls_out_of_order_are_refused():
     envs.recv()
     envs.send(np.zeros((2, 2)))
     envs.close()  # waits for it
+
+
+# ---- The benchmark.
+
+
+def bench(*arguments):
+    command = [sys.executable, "-m", "ruedo.gym.bench", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_the_benchmark_prints_a_row_for_each_simulator():
+    done = bench("--envs", "3", "--beams", "5", "--seconds", "0.1", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [row["simulator"].partition(",")[0] for row in rows[:2]] == ["Ruedo", "Ruedo"]
+    assert all((row["envs"], row["beams"]) == (3, 5) and row["steps_per_s"] > 0 for row in rows)
+    done = bench("--envs", "2", "--beams", "5", "--seconds", "0.1")
+    assert "2 environments, 5 beams" in done.stdout and "\nMuJoCo - " in done.stdout
+
+
+def test_the_benchmark_refuses_wrong_sizes():
+    for wrong in (["--envs", "0"], ["--beams", "1"], ["--seconds", "nan"], ["--envs", "x"]):
+        done = bench(*wrong)
+        assert done.returncode == 2 and "--envs" in done.stderr, done.stderr
