@@ -161,6 +161,34 @@ def converter(one: Record, vocabulary: Vocabulary) -> list[str]:
     return [*lines, f"    return {one.name}(", *(f"        {value}," for value in values), "    )"]
 
 
+def column(one: Field, vocabulary: Vocabulary) -> str:
+    """An expression of the columns c of the message's members."""
+    def members(names: Iterable[str]) -> str:
+        return ", ".join(f'c["{name}"]' for name in names)
+
+    if one.member is None:
+        return f"steps_column({members(one.steps)})"
+    value = members([one.member.name])
+    if one.enum:
+        return f"words_of({table_of(vocabulary.enums[one.enum])}, {value})"
+    if one.sizes:
+        return f"shaped_column({value}, {members(one.sizes)}{', optional=True' if one.optional else ''})"
+    numbers = one.shape.strip("()")
+    return f"{value}.reshape(-1, {numbers})" if one.shape and is_array(one) else value
+
+
+def is_flat(one: Record) -> bool:
+    """Whether its columns are made of the members' columns: it has no parts, nothing to escape."""
+    return not any(field.part or field.terminal for field in one.of("python"))
+
+
+def column_converter(one: Record, vocabulary: Vocabulary) -> list[str]:
+    lines = ["", "", f"def _{stem(one)}_columns(c: dict[str, Any]) -> dict[str, Any]:"]
+    head = ['"utime": c["utime"]'] if vocabulary.has_utime(one) else []
+    fields = [f'"{field.name}": {column(field, vocabulary)}' for field in one.of("python")]
+    return [*lines, "    return {", *(f"        {line}," for line in [*head, *fields]), "    }"]
+
+
 def samples_module(vocabulary: Vocabulary) -> list[str]:
     lines = [MADE]
     lines += docstring(
@@ -176,14 +204,14 @@ def samples_module(vocabulary: Vocabulary) -> list[str]:
     used = {field.enum for one in records for field in one.fields if field.enum}
     tables = sorted(table_of(vocabulary.enums[name]) for name in used)
     mixins = sorted(f"{one.name}Methods" for one in records if "python" in one.methods)
-    values = "Sample, Value, counted, fixed, floats, shaped, steps, word"
+    values = "Sample Value counted fixed floats shaped shaped_column steps steps_column word words_of"
     lines += ["", "from __future__ import annotations", ""]
     lines += ["from collections.abc import Callable", "from dataclasses import dataclass"]
     lines += ["from typing import Any", "", "import numpy as np"]
     lines += ["from numpy.typing import NDArray", "", "from . import lcmtypes"]
     lines += ["from .errors import for_terminal", "from .geometry import Floats"]
     lines += imported("sample_methods", mixins)
-    lines += [f"from .values import {values}"]
+    lines += imported("values", values.split())
     lines += [f"from .vocabulary import {', '.join(tables)}"]
     lines += ["", *exported(one.name for one in records)]
     for one in records:
@@ -196,6 +224,13 @@ def samples_module(vocabulary: Vocabulary) -> list[str]:
     for one in vocabulary.samples.values():
         type = one.message.name
         lines.append(f'    "{type}": (lcmtypes.{type}, _{stem(one)}),')
+    flat = [one for one in vocabulary.samples.values() if is_flat(one)]
+    lines.append("}")
+    for one in flat:
+        lines += column_converter(one, vocabulary)
+    lines += ["", "", "# Message type -> the columns of its samples, from those of its members."]
+    lines.append("COLUMNS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {")
+    lines += [f'    "{one.message.name}": _{stem(one)}_columns,' for one in flat]
     lines += ["}", "", "", "# The same of the bodies of replies."]
     lines.append("REPLIES: dict[str, tuple[Any, Callable[[Any], Any]]] = {")
     for one in vocabulary.replies.values():

@@ -34,7 +34,7 @@ bool is_bag_folder(const std::string& path) {
 
 }  // namespace
 
-Reader::Reader(const std::string& path) : path_(path) {
+Reader::Reader(const std::string& path, const std::string& doing) : path_(path) {
   if (is_bag_folder(path)) refuse_bag(path);
   InputFile input = open_input(path);
   file_ = std::move(input.file);
@@ -47,7 +47,7 @@ Reader::Reader(const std::string& path) : path_(path) {
   }
   std::rewind(file_.get());
   offset_ = 0;
-  progress_.emplace("reading " + path, size_);
+  progress_.emplace(doing + " " + path, size_);
 }
 
 bool Reader::read(void* into, size_t size) {
@@ -69,6 +69,64 @@ void Reader::seek(int64_t offset) {
                ? ""
                : "cannot be read at byte " + std::to_string(offset);
   offset_ = offset;
+}
+
+namespace {
+
+constexpr size_t kLookedAt =
+    1 << 16;  // bytes at a time in which an event's beginning is looked for
+
+// Whether an event may begin with these bytes.
+bool is_head(const uint8_t* head) {
+  const auto time = read_big_endian<int64_t>(head + 12);
+  return read_big_endian<uint32_t>(head) == kLogSync &&
+         read_big_endian<uint32_t>(head + 20) <= kMaxChannel &&
+         read_big_endian<uint32_t>(head + 24) <= kLargestMessage && time >= -kLatestLogTime_us &&
+         time <= kLatestLogTime_us;
+}
+
+int64_t size_by(const uint8_t* head) {
+  return int64_t{kLogHeadSize} + read_big_endian<uint32_t>(head + 20) +
+         read_big_endian<uint32_t>(head + 24);
+}
+
+}  // namespace
+
+// The first one that begins between the two; what only looks like one in a message has no other
+// behind it.
+std::optional<int64_t> Reader::event_after(int64_t offset, int64_t end) {
+  std::vector<uint8_t> bytes(kLookedAt + kLogHeadSize);
+  for (; offset < end; offset += kLookedAt) {
+    seek(offset);
+    const size_t got = std::fread(bytes.data(), 1, bytes.size(), file_.get());
+    for (size_t i = 0; i + kLogHeadSize <= got && i < kLookedAt; ++i) {
+      const int64_t at = offset + static_cast<int64_t>(i);
+      if (at >= end) return {};
+      if (!is_head(bytes.data() + i)) continue;
+      const int64_t behind = at + size_by(bytes.data() + i);
+      std::array<uint8_t, kLogHeadSize> head{};
+      seek(behind);
+      if (behind == size_ || (read(head.data(), head.size()) && is_head(head.data()))) return at;
+    }
+  }
+  return {};
+}
+
+void Reader::seek_time(SimTime time_us) {
+  constexpr int64_t kNear = 1 << 20;  // bytes that are read faster than halved
+  int64_t low = 0, high = size_;  // an event begins at low, and is before the time, or the first
+  while (high - low > kNear) {
+    const int64_t middle = low + (high - low) / 2;
+    const std::optional<int64_t> found = event_after(middle, high);
+    std::array<uint8_t, kLogHeadSize> head{};
+    if (found) seek(*found);
+    if (found && read(head.data(), head.size()) &&
+        read_big_endian<int64_t>(head.data() + 12) < time_us)
+      low = *found;
+    else
+      high = middle;
+  }
+  seek(low);
 }
 
 bool Reader::next(Event& event, const std::function<bool(const std::string&)>& wanted) {
@@ -93,9 +151,7 @@ bool Reader::read_event(Event& event, const std::function<bool(const std::string
   const uint32_t data_size = read_big_endian<uint32_t>(head.data() + 24);
   event.number = read_big_endian<int64_t>(head.data() + 4);
   event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
-  if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel ||
-      data_size > kLargestMessage || event.timestamp_us < -kLatestLogTime_us ||
-      event.timestamp_us > kLatestLogTime_us) {
+  if (!is_head(head.data())) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;
   }

@@ -25,7 +25,8 @@ struct Event {
 class Reader {
  public:
   // Throws InputError when the file cannot be opened, or is not an LCM log.
-  explicit Reader(const std::string& path);
+  // doing: in a terminal's line, before the path.
+  explicit Reader(const std::string& path, const std::string& doing = "reading");
 
   // Reads the next whole event; false at the end, or where the log was cut off or is damaged: see
   // fault(). The event's buffers are reused. wanted: of other channels the data is passed over, and
@@ -34,6 +35,10 @@ class Reader {
 
   // The next event is that at this byte, where offset() was before one.
   void seek(int64_t offset);
+
+  // The next event is one before which there is none of that time or later, and is close to it: in
+  // a log whose times never go back, found by halves.
+  void seek_time(SimTime time_us);
 
   // After next() returned false: "" at a proper end, else what is wrong and at which byte.
   const std::string& fault() const { return fault_; }
@@ -45,6 +50,7 @@ class Reader {
   bool read_event(Event& event, const std::function<bool(const std::string&)>& wanted);
   bool read(void* into, size_t size);
   bool skip(size_t size);
+  std::optional<int64_t> event_after(int64_t offset, int64_t end);
 
   std::string path_;
   std::unique_ptr<std::FILE, InputFile::Close> file_;

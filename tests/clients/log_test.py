@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -165,3 +166,160 @@ def test_read_log_warns_where_a_log_is_damaged(tmp_path, log, caplog):
         frames = ruedo.read_log(path)
         assert caplog.messages == [f"{path}: {why}"]
         assert 0 < sum(map(len, frames.values())) < sum(whole.values())
+
+
+def written(path, found):
+    """A log of these events, by LCM's own module."""
+    lcm = pytest.importorskip("lcm")
+    writer = lcm.EventLog(str(path), "w", overwrite=True)
+    for timestamp, channel, data in found:
+        writer.write_event(timestamp, channel, data)
+    writer.close()
+    return path
+
+
+def all_kinds():
+    """Five messages of each of three types: numbers, arrays that are not equally long, texts."""
+    from ruedo.lcmtypes import joint_state_t, marker_t, pose_t
+
+    for k in range(5):
+        pose = pose_t()
+        pose.utime, pose.pos, pose.orientation = 10_000 * k, [0.5 * k, -1.0, 2.0], [1.0, 0, 0, 0]
+        yield 10_000 * k, "r/pose", pose.encode()
+        joints = joint_state_t()
+        joints.num_joints = k % 3
+        joints.joint_name = [f"joint{i}\u00e9" for i in range(k % 3)]
+        for name, kind in zip(joints.__slots__, joints.__typenames__):
+            if name not in ("num_joints", "joint_name", "utime"):
+                setattr(joints, name, [0.25 * k + i for i in range(k % 3)])
+                assert kind in ("float", "double"), name
+        yield 10_000 * k, "r/joints", joints.encode()
+        marker = marker_t()
+        marker.n, marker.points = 2 * k, [[float(i), 0.5, -k] for i in range(2 * k)]
+        yield 10_000 * k, "markers", marker.encode()
+
+
+def test_columns_of_a_log(tmp_path):
+    ruedo = pytest.importorskip("ruedo")
+    path = written(tmp_path / "run.lcm", all_kinds())
+    log = ruedo.open_log(path)
+    assert log.channels["r/pose"] == ("pose_t", 5, 0.0, 0.04)
+    pose = log.columns("r/pose")
+    assert pose["utime"].tolist() == [0, 10_000, 20_000, 30_000, 40_000]
+    assert pose["position"].tolist() == [[0.5 * k, -1.0, 2.0] for k in range(5)]
+    assert log.columns("r/pose", raw=True)["pos"].tolist() == pose["position"].tolist()
+    joints = log.columns("r/joints")
+    assert joints["names"].tolist() == [
+        [f"joint{i}\u00e9" for i in range(k % 3)] for k in range(5)
+    ]
+    markers = log.columns("markers")
+    assert [one.tolist() for one in markers["points"]] == [
+        [[float(i), 0.5, -k] for i in range(2 * k)] for k in range(5)
+    ]
+    assert log.columns("r/pose", begin=0.02, end=0.03)["utime"].tolist() == [20_000, 30_000]
+    with pytest.raises(ruedo.UnknownName, match="no channel 'nobody'; it has markers, r/joints"):
+        log.columns("nobody")
+
+
+def test_a_message_of_another_type_or_none_is_left_out(tmp_path):
+    ruedo = pytest.importorskip("ruedo")
+    [(_, _, pose), (_, _, joints), *_] = all_kinds()
+    bad = [pose[:-1], pose + b"x", joints, b"", pose[:3]]
+    path = written(tmp_path / "run.lcm", [(k, "c", one) for k, one in enumerate([pose, *bad, pose])])
+    assert len(ruedo.open_log(path).columns("c")["utime"]) == 2
+
+
+def same(one, other):
+    """Cells may be arrays, lists, dicts and texts."""
+    if hasattr(one, "dtype") or hasattr(other, "dtype"):
+        assert one.dtype == other.dtype and one.shape == other.shape
+        if one.dtype != object:
+            return one.tobytes() == other.tobytes()
+        return all(same(a, b) for a, b in zip(one, other))
+    return one == other
+
+
+@pytest.mark.parametrize("raw", [True, False])
+def test_the_module_and_python_read_the_same(log, tmp_path, raw):
+    """Python decodes by the classes of lcm-gen, which know nothing of the module."""
+    pytest.importorskip("ruedo._engine")
+    from ruedo import logs
+
+    for path in (str(log), str(written(tmp_path / "kinds.lcm", all_kinds()))):
+        compiled, python = (
+            logs.read_columns(path, None, None, None, raw),
+            logs._read_in_python(path, None, None, None, raw),
+        )
+        assert set(compiled) == set(python) and len(compiled) >= 3
+        for channel, columns in python.items():
+            assert list(compiled[channel]) == list(columns)
+            for name, column in columns.items():
+                assert same(compiled[channel][name], column), (channel, name)
+
+
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    """64 MB: a scan of 1000 rays, and a pose, each ms."""
+    ruedo = pytest.importorskip("ruedo")
+    scan, pose = ruedo.lcmtypes.planar_lidar_t(), ruedo.lcmtypes.pose_t()
+    scan.nranges, scan.ranges = 1000, [1.0] * 1000
+    scan.nintensities, scan.intensities = 0, []
+
+    def found():
+        for k in range(15_000):
+            scan.utime = pose.utime = 1000 * k
+            yield 1000 * k, "r/lrf", scan.encode()
+            yield 1000 * k, "r/pose", pose.encode()
+
+    return written(tmp_path_factory.mktemp("long") / "run.lcm", found())
+
+
+@pytest.mark.parametrize(
+    "begin, end", [(None, 0.5), (0.0, 0.0), (7.4995, 7.5025), (14.9, None), (14.999, 20), (16, 17)]
+)
+def test_a_range_of_times(long_log, begin, end):
+    """In a log that is long enough to be halved."""
+    ruedo = pytest.importorskip("ruedo")
+    there = [
+        1000 * k
+        for k in range(15_000)
+        if (begin is None or k >= begin * 1000) and (end is None or k <= end * 1000)
+    ]
+    found = ruedo.open_log(long_log).columns("r/pose", begin, end)
+    assert (found["utime"].tolist() if found else []) == there
+
+
+def test_memory_is_what_is_returned(long_log):
+    """A channel of small messages, and one of large ones: with a buffer of 16 MB."""
+    pytest.importorskip("ruedo._engine")
+    program = (
+        "import resource, sys, ruedo\n"
+        "log = ruedo.open_log(sys.argv[1])\n"
+        "log.columns('r/pose', end=0.001)\n"  # what is loaded once
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "columns = log.columns(sys.argv[2])\n"
+        "after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "print((after - before) * 1024, sum(one.nbytes for one in columns.values()))\n"
+    )
+    for channel in ("r/pose", "r/lrf"):
+        done = subprocess.run(
+            [sys.executable, "-c", program, str(long_log), channel],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        grown, returned = map(int, done.stdout.split())
+        assert returned > 15_000 * 8 * 8
+        assert grown < returned + 16e6, (channel, grown, returned)
+
+
+def test_arrow_and_parquet(tmp_path):
+    ruedo = pytest.importorskip("ruedo")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    log = ruedo.open_log(written(tmp_path / "run.lcm", all_kinds()))
+    for channel in ("r/pose", "r/joints", "markers"):
+        table = log.arrow(channel)
+        parquet.write_table(table, tmp_path / "table.parquet")
+        assert parquet.read_table(tmp_path / "table.parquet").equals(table)
+    assert log.arrow("r/pose")["position"].to_pylist()[4] == [2.0, -1.0, 2.0]
+    assert log.arrow("r/joints")["names"].to_pylist()[1] == ["joint0\u00e9"]

@@ -24,7 +24,8 @@
 #include "base/version.h"
 #include "engine/engine.h"
 #include "log/header.h"
-#include "program_end.h"
+#include "log_columns.h"
+#include "python_thread.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
 #include "system/plugins.h"
@@ -40,19 +41,6 @@ using ruedo::engine::SavedWorld;
 
 namespace {
 
-nb::dlpack::dtype dtype_of(Primitive type) {
-  switch (type) {
-    case Primitive::boolean: return nb::dtype<bool>();
-    case Primitive::byte: return nb::dtype<uint8_t>();
-    case Primitive::int8: return nb::dtype<int8_t>();
-    case Primitive::int16: return nb::dtype<int16_t>();
-    case Primitive::int32: return nb::dtype<int32_t>();
-    case Primitive::int64: return nb::dtype<int64_t>();
-    case Primitive::float32: return nb::dtype<float>();
-    default: return nb::dtype<double>();
-  }
-}
-
 // A view of the engine's own memory, which stays as long as any view of it, and is written by
 // step() and reset().
 nb::object view_of(std::shared_ptr<const FieldArray> array) {
@@ -63,30 +51,6 @@ nb::object view_of(std::shared_ptr<const FieldArray> array) {
   const std::vector<size_t> shape((*held)->shape.begin(), (*held)->shape.end());
   return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*held)->values.data(), shape.size(), shape.data(),
                                                  owner, nullptr, dtype_of((*held)->type)));
-}
-
-// Lets other Python threads run for as long as it lives.
-class Unlocked {
- public:
-  Unlocked() : state_(PyEval_SaveThread()) {}
-  ~Unlocked() {
-    call_python([this] { PyEval_RestoreThread(state_); });
-  }
-  Unlocked(const Unlocked&) = delete;
-  Unlocked& operator=(const Unlocked&) = delete;
-
- private:
-  PyThreadState* const state_;
-};
-
-// Whether a signal has come, and its handler raised an exception. Called without Python's lock.
-bool interrupts() {
-  bool raised = false;
-  call_python([&raised] {
-    const nb::gil_scoped_acquire locked;
-    raised = PyErr_CheckSignals() != 0;
-  });
-  return raised;
 }
 
 struct Recorded {
@@ -393,6 +357,7 @@ NB_MODULE(_engine, module) {
   module.def("sin", &ruedo::math::sin);
   module.def("cos", &ruedo::math::cos);
   add_arrivals(module);
+  add_log_columns(module);
   nb::class_<Saved>(module, "Saved");
   nb::class_<PyEngine>(module, "Engine")
       .def(nb::init<const nb::bytes&, const std::optional<std::string>&, int, uint64_t, bool, int,

@@ -48,7 +48,7 @@ if TYPE_CHECKING or _HAS_NUMPY:
     )
     from .launch import find_ruedo, launch
     from .lockstep import Command, Message, Observations
-    from .logs import read_log
+    from .logs import Log, LogChannel, open_log, read_log
     from .maps import OccupancyMap, load_map
     from .motion import Motion
     from .robot import Camera, Device, Robot
@@ -86,6 +86,8 @@ __all__ = [
     "Device",
     "LaunchError",
     "LeaseLost",
+    "Log",
+    "LogChannel",
     "Message",
     "Motion",
     "MotionError",
@@ -112,6 +114,7 @@ __all__ = [
     "lcmtypes",
     "load_map",
     "markers",
+    "open_log",
     "read_log",
 ]
 if TYPE_CHECKING or _HAS_NUMPY:

@@ -120,3 +120,36 @@ def counted(length: int) -> None:
     """Raises ValueError for a length below 0: lcm-gen's Python reads none then."""
     if length < 0:
         raise ValueError(f"a length of {length}")
+
+
+# Columns: the same of many messages at once, one array for each member of the message.
+
+
+def words_of(words: Mapping[int, str], numbers: NDArray[Any]) -> NDArray[Any]:
+    """(n,) texts of an enumeration."""
+    known = {number: word(words, number) for number in set(numbers.tolist())}
+    return np.fromiter((known[number] for number in numbers.tolist()), object, len(numbers))
+
+
+def shaped_column(values: Any, rows: Any, columns: Any, optional: bool = False) -> NDArray[Any]:
+    """(n, rows, columns) where all have the same; else n arrays. Raises ValueError as shaped()."""
+    sizes = {*zip(rows.tolist(), columns.tolist())}
+    if len(sizes) == 1 and values.dtype != object:
+        height, width = sizes.pop()
+        if optional and values.shape[1] == 0:
+            height = width = 0
+        if min(height, width) < 0 or height * width != values.shape[1]:
+            raise ValueError("sizes that do not fit each other")
+        return values.reshape(len(values), height, width)
+    each = (shaped(*one, optional) for one in zip(values, rows.tolist(), columns.tolist()))
+    return np.fromiter(each, object, len(values))
+
+
+def steps_column(first: Any, step: Any, count: Any) -> NDArray[Any]:
+    """(n, count) where all have as many; else n arrays."""
+    counts = set(count.tolist())
+    if len(counts) == 1:
+        numbers = np.arange(counts.pop())
+        return first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * numbers
+    each = (steps(*one) for one in zip(first.tolist(), step.tolist(), count.tolist()))
+    return np.fromiter(each, object, len(first))
