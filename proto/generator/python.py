@@ -163,6 +163,7 @@ def converter(one: Record, vocabulary: Vocabulary) -> list[str]:
 
 def column(one: Field, vocabulary: Vocabulary) -> str:
     """An expression of the columns c of the message's members."""
+
     def members(names: Iterable[str]) -> str:
         return ", ".join(f'c["{name}"]' for name in names)
 
@@ -204,7 +205,9 @@ def samples_module(vocabulary: Vocabulary) -> list[str]:
     used = {field.enum for one in records for field in one.fields if field.enum}
     tables = sorted(table_of(vocabulary.enums[name]) for name in used)
     mixins = sorted(f"{one.name}Methods" for one in records if "python" in one.methods)
-    values = "Sample Value counted fixed floats shaped shaped_column steps steps_column word words_of"
+    values = (
+        "Sample Value counted fixed floats shaped shaped_column steps steps_column word words_of"
+    )
     lines += ["", "from __future__ import annotations", ""]
     lines += ["from collections.abc import Callable", "from dataclasses import dataclass"]
     lines += ["from typing import Any", "", "import numpy as np"]

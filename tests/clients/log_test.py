@@ -209,9 +209,7 @@ def test_columns_of_a_log(tmp_path):
     assert pose["position"].tolist() == [[0.5 * k, -1.0, 2.0] for k in range(5)]
     assert log.columns("r/pose", raw=True)["pos"].tolist() == pose["position"].tolist()
     joints = log.columns("r/joints")
-    assert joints["names"].tolist() == [
-        [f"joint{i}\u00e9" for i in range(k % 3)] for k in range(5)
-    ]
+    assert joints["names"].tolist() == [[f"joint{i}\u00e9" for i in range(k % 3)] for k in range(5)]
     markers = log.columns("markers")
     assert [one.tolist() for one in markers["points"]] == [
         [[float(i), 0.5, -k] for i in range(2 * k)] for k in range(5)
@@ -225,7 +223,9 @@ def test_a_message_of_another_type_or_none_is_left_out(tmp_path):
     ruedo = pytest.importorskip("ruedo")
     [(_, _, pose), (_, _, joints), *_] = all_kinds()
     bad = [pose[:-1], pose + b"x", joints, b"", pose[:3]]
-    path = written(tmp_path / "run.lcm", [(k, "c", one) for k, one in enumerate([pose, *bad, pose])])
+    path = written(
+        tmp_path / "run.lcm", [(k, "c", one) for k, one in enumerate([pose, *bad, pose])]
+    )
     assert len(ruedo.open_log(path).columns("c")["utime"]) == 2
 
 

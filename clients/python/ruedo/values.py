@@ -146,10 +146,16 @@ def shaped_column(values: Any, rows: Any, columns: Any, optional: bool = False) 
 
 
 def steps_column(first: Any, step: Any, count: Any) -> NDArray[Any]:
-    """(n, count) where all have as many; else n arrays."""
+    """(n, count) where all have as many; else n arrays. Of a scanner, which has the same angles in
+    each message, they take the memory of one.
+    """
+    if len({*zip(first.tolist(), step.tolist(), count.tolist())}) == 1:
+        values = steps(float(first[0]), float(step[0]), int(count[0]))
+        return np.broadcast_to(values, (len(first), len(values)))
     counts = set(count.tolist())
     if len(counts) == 1:
-        numbers = np.arange(counts.pop())
-        return first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * numbers
+        columns = np.multiply.outer(step.astype(np.float64), np.arange(counts.pop()))
+        columns += first.astype(np.float64)[:, None]
+        return columns
     each = (steps(*one) for one in zip(first.tolist(), step.tolist(), count.tolist()))
     return np.fromiter(each, object, len(first))

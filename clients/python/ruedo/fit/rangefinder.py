@@ -154,7 +154,9 @@ def fit_beams(found: Residuals) -> tuple[BeamModel, Array]:
         bias, log_range, log_bearing, logit = values
         variance = np.exp(2 * log_range) + np.exp(2 * log_bearing) * slope**2
         share = 1 / (1 + np.exp(-logit))
-        hit = (1 - share) * np.exp(-0.5 * (x - bias) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
+        hit = (
+            (1 - share) * np.exp(-0.5 * (x - bias) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
+        )
         return -float(np.log(hit + share / (2 * OUTLIER_M)).sum())
 
     start = np.array([0.0, np.log(max(usual, 1e-4)), np.log(1e-3), -3.0])
@@ -182,7 +184,9 @@ def _curvature(cost: object, values: Array) -> Array:
     return answer
 
 
-def fit_rangefinder(recordings: Sequence[Recording], mount: Array) -> tuple[BeamModel, list[Estimate]]:
+def fit_rangefinder(
+    recordings: Sequence[Recording], mount: Array
+) -> tuple[BeamModel, list[Estimate]]:
     """Of the first recording with scans. Raises FitError, also for too little that is seen
     again.
     """
@@ -223,8 +227,19 @@ def _no_returns(recording: Recording, keys: NDArray[np.int64]) -> list[Estimate]
     count, missing = seen.size, int(lost.sum())
     share = missing / count
     std = np.sqrt(max(share * (1 - share), 1 / count) / count)
-    why = "of all beams: open space is in it; by range, incidence and reflectance it needs the world"
-    return [Estimate("share of beams without return", share, max(0.0, share - 2 * std), share + 2 * std, "", why)]
+    why = (
+        "of all beams: open space is in it; by range, incidence and reflectance it needs the world"
+    )
+    return [
+        Estimate(
+            "share of beams without return",
+            share,
+            max(0.0, share - 2 * std),
+            share + 2 * std,
+            "",
+            why,
+        )
+    ]
 
 
 def _resolution(recording: Recording) -> list[Estimate]:
