@@ -76,6 +76,8 @@ def compiled(folder, block):
             "-Werror",
             "-I",
             str(SOURCE / "include"),
+            "-I",
+            str(BUILD / "generated/include"),
             "ten.cpp",
             str(BUILD / "clients/cpp/libruedo_client.a"),
             str(library),
