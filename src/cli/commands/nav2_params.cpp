@@ -13,6 +13,7 @@
 #include "engine/world_info.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
+#include "ruedo/math.h"
 #include "world/model/footprint.h"
 
 namespace ruedo::cli {
@@ -47,7 +48,7 @@ struct Robot {
            drive->steering == Steering::holonomic;
   }
   double turning_radius() const {  // m; 0: it turns on the spot
-    return drive->max_steering_angle > 0 ? drive->wheelbase / std::tan(drive->max_steering_angle)
+    return drive->max_steering_angle > 0 ? drive->wheelbase / math::tan(drive->max_steering_angle)
                                          : 0.0;
   }
 };

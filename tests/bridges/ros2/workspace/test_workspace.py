@@ -89,7 +89,9 @@ def ros(request):
 @needs("ros2topic")
 def test_topics(ros):
     ros.finds("/scan [sensor_msgs/msg/LaserScan]", "topic", "list", "-t")
-    assert "frame_id: lrf" in ros("topic", "echo", "--once", "/scan")
+    # With the type `ros2 topic echo` waits for the topic, and without it gives up at once.
+    kind = "sensor_msgs/msg/LaserScan"
+    assert "frame_id: lrf" in ros("topic", "echo", "--once", "/scan", kind)
     rate = ros.until(r"average rate: ([\d.]+)", "topic", "hz", "/scan", "--use-sim-time")
     assert float(rate[1]) == pytest.approx(10, rel=0.2)
 
