@@ -28,7 +28,7 @@ from ruedo.rooms import (
     make_room,
 )
 
-TASKS = ["Navigate", "Corridor", "Crowd", "Push", "Camera"]
+TASKS = ["Navigate", "Corridor", "Crowd", "Push", "Camera", "Hills"]
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -415,6 +415,37 @@ def test_wrong_numbers_of_people_are_refused():
         ruedo.gym.CrowdVectorEnv(1, people=51)
     with pytest.raises(TypeError, match="no obstacles"):
         ruedo.gym.CrowdVectorEnv(1, obstacles=3)
+
+
+# Straight to the goal, over hills: the robot rises by what geometry says of where it is, and leans
+# towards the hill's foot.
+def test_a_robot_drives_over_hills():
+    env = ruedo.gym.HillsEnv(beams=5, noise=False, hills=6, split="test")
+    came = 0
+    highest = steepest = 0.0
+    for seed in range(6):
+        observation, _ = env.reset(seed=seed)
+        hills = []
+        for model in ET.fromstring(env.scene.sdf).iter("model"):
+            if model.get("name").startswith("hill"):
+                x, y, z = (float(v) for v in model.findtext("pose").split()[:3])
+                hills.append((x, y, z, float(model.findtext(".//radius"))))
+        over = False
+        while not over:
+            bearing = math.atan2(observation[7], observation[6])
+            action = np.array([1.0 if abs(bearing) < 0.5 else -1.0, np.clip(2 * bearing, -1, 1)])
+            observation, _, terminated, truncated, info = env.step(action)
+            over = terminated or truncated
+            px, py, pz = env.task.position("robot")[0]
+            tops = [
+                z + math.sqrt(max(r * r - (px - x) ** 2 - (py - y) ** 2, 0.0))
+                for x, y, z, r in hills
+            ]
+            assert pz == pytest.approx(max(0.0, *tops), abs=0.12)  # wheels stand around it
+            highest, steepest = max(highest, pz), max(steepest, np.hypot(*observation[8:10]))
+        came += info["success"]
+    assert came >= 3 and highest > 0.1 and 0.05 < steepest < math.sin(0.7)
+    env.close()
 
 
 # The robot drives to behind the box, as seen from the place, and pushes.

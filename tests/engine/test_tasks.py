@@ -330,7 +330,7 @@ def test_a_goal_task_needs_a_scene_alone():
 # ---- Options of the shipped tasks.
 
 
-@pytest.mark.parametrize("task", ["Navigate", "Corridor", "Crowd", "Push", "Camera"])
+@pytest.mark.parametrize("task", ["Navigate", "Corridor", "Crowd", "Push", "Camera", "Hills"])
 @pytest.mark.parametrize(
     "options",
     [

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "make_corridor",
     "make_crowd_hall",
     "make_fleet_room",
+    "make_hills",
     "make_landmark_room",
     "make_push_room",
     "make_room",
@@ -33,12 +34,14 @@ class Scene:
 
     number: int
     sdf: str
+    extent: tuple[float, float, float] = field(default=(0.0, 0.0, 8.6), kw_only=True)
+    """x and y of the middle, and the width of what is to be seen, m"""
 
     def seen_from_above(self) -> str:
         """The same with a camera of 256 x 256 pixels above it, ten times a second: the device
         "overview".
         """
-        x, y, width = self._extent()
+        x, y, width = self.extent
         camera = (
             f"<model name='overview'><static>true</static><pose>{x:.3f} {y:.3f} {width:.3f} 0 1.5707963 0</pose><link name='link'>"
             "<sensor name='overview' type='camera'><update_rate>10</update_rate><ruedo:encoding>rgb</ruedo:encoding><camera>"
@@ -46,10 +49,6 @@ class Scene:
             "<clip><near>0.1</near><far>100</far></clip></camera></sensor></link></model>"
         )
         return self.sdf.replace("</world>", camera + "</world>")
-
-    def _extent(self) -> tuple[float, float, float]:
-        """The middle, and the width of what is to be seen, m."""
-        return 0.0, 0.0, 8.6
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,6 @@ class PushRoom(Room):
 class CrowdHall(Room):
     """A hall with people."""
 
-    def _extent(self) -> tuple[float, float, float]:
-        return 0.0, 0.0, 10.6
-
 
 @dataclass(frozen=True)
 class Corridor(Scene):
@@ -81,11 +77,6 @@ class Corridor(Scene):
 
     middle: tuple[tuple[float, float], ...]  # m
     width: float  # m
-
-    def _extent(self) -> tuple[float, float, float]:
-        ys = [y for _, y in self.middle]
-        length = self.middle[-1][0]
-        return length / 2, (min(ys) + max(ys)) / 2, max(length, max(ys) - min(ys)) + 3.0
 
 
 def _wall(name: str, x: float, y: float, heading: float, size: tuple[float, float, float]) -> str:
@@ -217,7 +208,10 @@ def make_corridor(number: int, robot: str = "p3at", pieces: int = 6) -> Corridor
     )
     start = (0.0, between(-0.1, 0.1), headings[0] + between(-0.3, 0.3))
     sdf = _world(f"corridor-{number}", [_robot("robot", robot, start), *models])
-    return Corridor(number, sdf, tuple(middle), width)
+    ys = [y for _, y in middle]
+    length, low, high = middle[-1][0], min(ys), max(ys)
+    extent = (length / 2, (low + high) / 2, max(length, high - low) + 3.0)
+    return Corridor(number, sdf, tuple(middle), width, extent=extent)
 
 
 def _wall_between(name: str, a: tuple[float, float], b: tuple[float, float]) -> str:
@@ -320,7 +314,39 @@ def make_crowd_hall(number: int, robot: str = "p3at", people: int = 8) -> CrowdH
         )
     ]
     sdf = _world(f"crowd-{number}", [_robot("robot", robot, start), *walls, *crowds])
-    return CrowdHall(number, sdf, start, goal)
+    return CrowdHall(number, sdf, start, goal, extent=(0.0, 0.0, 10.6))
+
+
+def make_hills(number: int, robot: str = "p3at", size: float = 10.0, hills: int = 6) -> Room:
+    """The place of that number: a square with hills, a start on its floor, and a goal at least half
+    of the square away.
+
+    A hill is the top of a buried ball of 4 to 8 m radius, 0.2 to 0.5 m high: slopes up to 0.5 rad.
+    """
+    draw = random.Random(number)
+    between = _between(draw)
+    reach = size / 2 - 0.8
+    start = (between(-reach, reach), between(-reach, reach), between(-3.1, 3.1))
+    goal = start[:2]
+    while math.dist(goal, start[:2]) < size / 2:
+        goal = (between(-reach, reach), between(-reach, reach))
+    models = [_robot("robot", robot, start), *_square(size)]
+    while len(models) < 5 + hills:
+        x, y = between(-size / 2, size / 2), between(-size / 2, size / 2)
+        radius, height = between(4.0, 8.0), between(0.2, 0.5)
+        foot = math.sqrt(height * (2.0 * radius - height))  # radius of the circle on the floor
+        if math.dist((x, y), start[:2]) > foot + 0.5:
+            models.append(_hill(f"hill{len(models)}", x, y, radius, height))
+    sdf = _world(f"hills-{number}", models)
+    return Room(number, sdf, start, goal, extent=(0.0, 0.0, size + 0.6))
+
+
+def _hill(name: str, x: float, y: float, radius: float, height: float) -> str:
+    ball = f"<geometry><sphere><radius>{radius:.4f}</radius></sphere></geometry>"
+    return (
+        f"<model name='{name}'><static>true</static><pose>{x:.4f} {y:.4f} {height - radius:.4f} 0 0 0</pose><link name='link'>"
+        f"<collision name='c'>{ball}</collision><visual name='v'>{ball}{_colour(0.35, 0.45, 0.24)}</visual></link></model>"
+    )
 
 
 def make_fleet_room(

@@ -242,11 +242,13 @@ class GoalTask(DriveTask):
 
     goal_m = GOAL_M
     tells_goal = True
+    own_terms: Mapping[str, spaces.Box] = {}  # behind the goal
 
     def __init__(self, **options: Any) -> None:
         low = np.array([0.0, -1.0, -1.0], np.float32)
         goal = spaces.Box(low, np.ones(3, np.float32), dtype=np.float32)
-        super().__init__({"goal": goal} if self.tells_goal else {}, **options)
+        goals = {"goal": goal} if self.tells_goal else {}
+        super().__init__({**goals, **self.own_terms}, **options)
 
     def setup(self) -> None:
         super().setup()
