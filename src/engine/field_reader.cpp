@@ -52,10 +52,7 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field) : schem
   for (size_t i = 0; i < schema.fields.size(); ++i) {
     const Field& one = schema.fields[i];
     if (one.primitive == Primitive::none) break;  // the offset of what follows cannot be computed
-    if (one.primitive == Primitive::string) {
-      if (!one.dimensions.empty()) break;
-      continue;
-    }
+    if (one.primitive == Primitive::string) continue;
     readable += (readable.empty() ? "" : ", ") + one.name;
     if (one.name != field) continue;
     target_ = i;
@@ -83,8 +80,9 @@ FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
   for (size_t i = 0; i < target_; ++i) {
     const Field& field = schema_->fields[i];
     if (field.primitive == Primitive::string) {
-      offset += sizeof(int32_t) +
-                static_cast<size_t>(read_integer(message.data() + offset, Primitive::int32));
+      for (int64_t text = length(field, counts); text > 0; --text)
+        offset += sizeof(int32_t) +
+                  static_cast<size_t>(read_integer(message.data() + offset, Primitive::int32));
       continue;
     }
     if (field.dimensions.empty() && is_integer(field.primitive))

@@ -28,7 +28,7 @@ from ruedo.rooms import (
     make_room,
 )
 
-TASKS = ["Navigate", "Corridor", "Crowd", "Push", "Camera", "Hills"]
+TASKS = ["Navigate", "Corridor", "Crowd", "Push", "Camera", "Hills", "Reach"]
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -415,6 +415,38 @@ def test_wrong_numbers_of_people_are_refused():
         ruedo.gym.CrowdVectorEnv(1, people=51)
     with pytest.raises(TypeError, match="no obstacles"):
         ruedo.gym.CrowdVectorEnv(1, obstacles=3)
+
+
+# Rates by the arm's Jacobian (v = J q'), of the links' lengths: the tip goes straight to the
+# target. Rewards are the way that it came nearer.
+def test_an_arm_reaches_its_target():
+    env = ruedo.gym.ReachEnv()
+    for seed in range(5):
+        observation, _ = env.reset(seed=seed)
+        np.testing.assert_allclose(observation[:6], [1, 1, 0, 0, 0, 0], atol=1e-5)
+        (x, y), total, steps = env.scene.target, 0.0, 0
+        np.testing.assert_allclose(observation[6:], [x - 0.9, y], atol=1e-5)
+        over = False
+        while not over:
+            cosines, sines, way = observation[:2], observation[2:4], observation[6:]
+            shoulder, elbow = np.arctan2(sines, cosines)
+            a, b = shoulder, shoulder + elbow
+            jacobian = np.array(
+                [
+                    [-0.5 * math.sin(a) - 0.4 * math.sin(b), -0.4 * math.sin(b)],
+                    [0.5 * math.cos(a) + 0.4 * math.cos(b), 0.4 * math.cos(b)],
+                ]
+            )
+            damped = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 0.01 * np.eye(2))
+            rates = damped @ way * 3.0
+            if abs(elbow) < 0.2:
+                rates[1] -= 1.0 if y > 0 else -1.0  # out of the stretched pose
+            observation, reward, terminated, truncated, info = env.step(np.clip(rates / 2, -1, 1))
+            total, steps, over = total + reward, steps + 1, terminated or truncated
+        assert info["success"] and np.hypot(*observation[6:]) < 0.03
+        nearer = math.dist((0.9, 0.0), (x, y)) - np.hypot(*observation[6:])
+        assert total == pytest.approx(nearer + 5.0 - 0.01 * steps, abs=1e-4)
+    env.close()
 
 
 # Straight to the goal, over hills: the robot rises by what geometry says of where it is, and leans

@@ -113,6 +113,22 @@ def test_a_server_shows_the_texture_of_what_a_program_builds(tmp_path):
         assert seen[100:110, 150:160, 0].min() > 60 and seen[100:110, 150:160, 1].max() < 30
 
 
+def test_joints_are_observed():
+    """Behind their names, which are texts."""
+    from ruedo.rooms import make_arm_place
+
+    with ruedo.Engine("arm", text=make_arm_place(1).sdf, worlds=2) as engine:
+        positions = engine.observe("joints.joint_position")
+        assert positions.shape == (2, 1, 2) and positions.dtype == np.float32
+        order = ruedo.lcmtypes.joint_command_t()
+        order.n, order.name, order.value = 2, ["shoulder", "elbow"], [0.0, 0.5]
+        order.mode = bytes([order.VELOCITY] * 2)
+        engine.command(1, "arm/joint_command", order)
+        engine.step(n=200)
+        np.testing.assert_allclose(positions[:, 0], [[0, 0], [0, 0.5]], atol=5e-3)
+        np.testing.assert_allclose(engine["joints.joint_velocity"][1, 0, 1], 0.5, atol=1e-2)
+
+
 def test_depth_is_observed_below_its_camera():
     """A wall 2 m ahead of the robot's centre fills the picture; depths are along the camera's
     axis, and so are the same everywhere.

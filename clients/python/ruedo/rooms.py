@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 __all__ = [
+    "ArmPlace",
     "Corridor",
     "CrowdHall",
     "PushRoom",
     "Room",
     "Scene",
+    "make_arm_place",
     "make_corridor",
     "make_crowd_hall",
     "make_fleet_room",
@@ -64,6 +66,13 @@ class PushRoom(Room):
     """A room whose goal is one for a box."""
 
     box: tuple[float, float, float]  # m, m, rad
+
+
+@dataclass(frozen=True)
+class ArmPlace(Scene):
+    """An arm, which is called "arm", and a target for its tip."""
+
+    target: tuple[float, float]  # m, from the arm's first axis
 
 
 @dataclass(frozen=True)
@@ -315,6 +324,52 @@ def make_crowd_hall(number: int, robot: str = "p3at", people: int = 8) -> CrowdH
     ]
     sdf = _world(f"crowd-{number}", [_robot("robot", robot, start), *walls, *crowds])
     return CrowdHall(number, sdf, start, goal, extent=(0.0, 0.0, 10.6))
+
+
+ARM_M = (0.5, 0.4)  # lengths of its links
+
+
+def make_arm_place(number: int) -> ArmPlace:
+    """The place of that number: an arm of two links, 0.5 m above the floor, stretched out along the
+    x axis, and a target at 0.25 to 0.85 m from its first axis.
+    """
+    between = _between(random.Random(number))
+    distance, bearing = between(0.25, 0.85), between(-2.3, 2.3)
+    target = (distance * math.cos(bearing), distance * math.sin(bearing))
+    links = [_arm_link("upper", 0.0, ARM_M[0], 1.0), _arm_link("fore", ARM_M[0], ARM_M[1], 0.6)]
+    joints = [
+        _arm_joint("shoulder", "base", "upper", -ARM_M[0] / 2),
+        _arm_joint("elbow", "upper", "fore", -ARM_M[1] / 2),
+    ]
+    arm = (
+        "<model name='arm'><link name='base'><pose>0 0 0.22 0 0 0</pose><collision name='c'><geometry><cylinder>"
+        "<radius>0.08</radius><length>0.4</length></cylinder></geometry></collision><visual name='v'><geometry><cylinder>"
+        "<radius>0.08</radius><length>0.4</length></cylinder></geometry></visual></link>"
+        "<joint name='foot' type='fixed'><parent>world</parent><child>base</child></joint>"
+        f"{''.join(links + joints)}<ruedo:joints/></model>"
+    )
+    mark = (
+        f"<model name='target'><static>true</static><pose>{target[0]:.4f} {target[1]:.4f} 0.5 0 0 0</pose><link name='link'>"
+        f"<visual name='v'><geometry><sphere><radius>0.03</radius></sphere></geometry>{_colour(0.1, 0.7, 0.2)}</visual></link></model>"
+    )
+    return ArmPlace(number, _world(f"arm-{number}", [arm, mark]), target, extent=(0.0, 0.0, 2.4))
+
+
+def _arm_link(name: str, x: float, length: float, mass: float) -> str:
+    bar = f"<geometry><box><size>{length} 0.06 0.06</size></box></geometry>"
+    inertia = mass * length * length / 12.0
+    return (
+        f"<link name='{name}'><pose>{x + length / 2} 0 0.5 0 0 0</pose><inertial><mass>{mass}</mass>"
+        f"<inertia><ixx>0.001</ixx><iyy>{inertia:.5f}</iyy><izz>{inertia:.5f}</izz></inertia></inertial>"
+        f"<collision name='c'>{bar}</collision><visual name='v'>{bar}{_colour(0.9, 0.6, 0.1)}</visual></link>"
+    )
+
+
+def _arm_joint(name: str, parent: str, child: str, x: float) -> str:
+    return (
+        f"<joint name='{name}' type='revolute'><parent>{parent}</parent><child>{child}</child><pose>{x} 0 0 0 0 0</pose><axis>"
+        "<xyz>0 0 1</xyz><limit><lower>-2.8</lower><upper>2.8</upper><effort>50</effort><velocity>2</velocity></limit></axis></joint>"
+    )
 
 
 def make_hills(number: int, robot: str = "p3at", size: float = 10.0, hills: int = 6) -> Room:

@@ -8,8 +8,8 @@ process, many at once.
     envs = gymnasium.make_vec("ruedo/Navigate-v0", num_envs=64, beams=24)     # one engine, all
     cores
 
-ruedo/Navigate-v0, ruedo/Corridor-v0, ruedo/Crowd-v0, ruedo/Push-v0, ruedo/Camera-v0 and
-ruedo/Hills-v0;
+ruedo/Navigate-v0, ruedo/Corridor-v0, ruedo/Crowd-v0, ruedo/Push-v0, ruedo/Camera-v0,
+ruedo/Hills-v0 and ruedo/Reach-v0;
 `FleetEnv` for several robots. docs/environments.md says what each observes, does, is rewarded for
 and succeeds with; the modules of this package say the same in short. `Task` is the base class for
 tasks of your own (docs/tasks.md).
@@ -32,6 +32,7 @@ from .environments import SavedEpisodes, TaskEnv, TaskVectorEnv
 from .hills import Hills, HillsEnv, HillsVectorEnv
 from .navigate import Navigate, NavigateEnv, NavigateVectorEnv
 from .push import Push, PushEnv, PushVectorEnv
+from .reach import Reach, ReachEnv, ReachVectorEnv
 from .task import Outcome, Task
 
 __all__ = [
@@ -57,6 +58,9 @@ __all__ = [
     "Push",
     "PushEnv",
     "PushVectorEnv",
+    "Reach",
+    "ReachEnv",
+    "ReachVectorEnv",
     "SavedEpisodes",
     "Task",
     "TaskEnv",
@@ -90,7 +94,7 @@ def register(name: str, task: type[Task]) -> None:
     )
 
 
-for _task in (Navigate, Corridor, Crowd, Push, Camera, Hills):
+for _task in (Navigate, Corridor, Crowd, Push, Camera, Hills, Reach):
     gymnasium.register(
         f"ruedo/{_task.__name__}-v0",
         entry_point=f"ruedo.gym:{_task.__name__}Env",

@@ -183,6 +183,10 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             allow_absolute=self._file is None,  # a text of this program, with files that it chose
             **self._options,
         )
+        if self.render_mode == "human" and not self._engine.robots:
+            raise ValueError(
+                "render_mode 'human' repeats what robots with a drive do; there is none"
+            )
         seconds = self.task.action_seconds
         self._steps = round(seconds / self._engine.dt)
         if self._steps < 1 or abs(self._steps * self._engine.dt - seconds) > 1e-9:
@@ -293,11 +297,12 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
             begun = self._over.copy()
             self._begin(np.flatnonzero(begun), info)
-        commands = self._commands(actions)
-        if begun is not None:
+        acted = np.ones(self.num_envs, bool) if begun is None else ~begun
+        commands = self._commands(actions, acted)
+        if begun is not None and commands is not None:
             commands[begun] = np.nan
         self._engine.step(commands, self._steps, worlds=None if begun is None else ~begun)
-        if self._console:
+        if self._console and commands is not None:
             self._console.step(commands[0], self._steps)
         self._actions += 1
         rewards, success, failure = self._outcome()
@@ -308,15 +313,20 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         late = self._actions >= self.max_episode_steps
         truncated = late & ~terminated if self.max_episode_steps >= 0 else np.zeros_like(late)
         self._over = terminated | truncated
-        acted = np.ones(self.num_envs, bool) if begun is None else ~begun
         info |= {"success": success, "_success": acted, "collision": failure, "_collision": acted}
         observations = self._observe()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             observations = self._begin_at_once(observations, info)
         return observations, rewards, terminated, truncated, info
 
-    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        commands = np.array(self.task.commands(actions), np.float64)
+    def _commands(
+        self, actions: NDArray[Any], acting: NDArray[np.bool_]
+    ) -> NDArray[np.float64] | None:
+        self.task.acting = acting
+        given = self.task.commands(actions)
+        if given is None:
+            return None
+        commands = np.array(given, np.float64)
         if commands.ndim != 3 or len(commands) != self.num_envs:
             raise ValueError(
                 f"{type(self.task).__name__}.commands() gives the shape {commands.shape}, not "

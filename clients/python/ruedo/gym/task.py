@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import array, shown
 from ..engine import Engine
+from ..lcmtypes import joint_command_t
 from ..rooms import Scene
 from ..world import World
 
@@ -60,6 +61,7 @@ class Task:
     engine: Engine
     num_envs: int
     scenes: list[Any]  # of each environment's episode
+    acting: NDArray[np.bool_]  # during `commands`: who takes an action; the others begin just now
 
     def scene(self, number: int) -> Scene | World | str:
         """The scene of that number: a world, its SDF, or a `ruedo.rooms.Scene` (or a subclass),
@@ -74,9 +76,10 @@ class Task:
     def begin(self, episodes: NDArray[np.intp]) -> None:
         """New episodes have begun in the environments of these indices, in ``scenes[i]``."""
 
-    def commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
+    def commands(self, actions: NDArray[Any]) -> NDArray[np.float64] | None:
         """The velocities that actions command: (environments, driven robots, 2) as (m/s, rad/s), or
-        3 as (m/s ahead, m/s left, rad/s). By default actions are those of `drive_commands`.
+        3 as (m/s ahead, m/s left, rad/s); None: none (of robots without a drive, see
+        `command_joints`). By default actions are those of `drive_commands`.
         """
         return drive_commands(actions)
 
@@ -115,6 +118,23 @@ class Task:
     def heading(self, robot: str | None = None) -> NDArray[np.float64]:
         """(environments,): true headings, rad in [-pi, pi]."""
         return headings(self.sensor("pose.orientation", robot))
+
+    def command_joints(
+        self,
+        robot: str,
+        joints: Sequence[str],
+        values: NDArray[Any],
+        mode: int = joint_command_t.VELOCITY,
+    ) -> None:
+        """Commands joints, from `commands`. values: (environments, joints), in rad/s or m/s, or as
+        mode says: one of ``joint_command_t``'s, such as POSITION or EFFORT.
+        """
+        message = joint_command_t()
+        message.n, message.name = len(joints), list(joints)
+        message.mode = bytes([mode]) * len(joints)
+        for i in np.flatnonzero(self.acting).tolist():
+            message.value = values[i].tolist()
+            self.engine.command(i, f"{robot}/joint_command", message)
 
     def touching(self) -> NDArray[np.bool_]:
         """(environments,): whether a driven robot ran into something during the last action."""
