@@ -27,6 +27,7 @@ Value read_value(WireReader& in) {
 // Of a number that was held against what is left.
 template <class Value>
 std::vector<Value> read_values(WireReader& in, size_t n) {
+  if constexpr (std::is_same_v<Value, uint8_t>) return in.bytes(n);  // pictures are large
   std::vector<Value> values(n);
   for (size_t i = 0; i < n; ++i) values[i] = read_value<Value>(in);
   return values;

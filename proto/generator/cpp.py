@@ -285,7 +285,8 @@ def request_declaration(one: Request) -> list[str]:
 
 def requests_header(vocabulary: Vocabulary) -> list[str]:
     lines = [MADE, "/// @file", "// The requests of Ruedo's client for C++.", "#pragma once", ""]
-    lines += ["#include <memory>", "#include <string>", "", '#include "ruedo/client_messages.h"']
+    lines += [f"#include <{one}>" for one in ("array", "memory", "string", "utility")]
+    lines += ["", '#include "ruedo/client_messages.h"']
     lines += ["", "namespace ruedo::client {", "", "class Core;", ""]
     lines += comment(
         "What Simulation asks the server for. Each throws NotSupported where the server has no such"
