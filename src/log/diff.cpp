@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <unordered_map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -49,19 +50,47 @@ std::vector<std::string> patterns_of(const std::set<std::string>& types) {
 
 // A scalar of a message. It points into that.
 struct Value {
-  std::string path, pattern;
-  std::optional<FieldValue> value;  // none: absent
-
-  std::string text() const { return value ? to_string(*value) : "(absent)"; }
+  uint64_t pattern;  // stands for FieldPath::pattern()
+  uint64_t place;    // stands for FieldPath::str()
+  FieldValue value;
 };
 
-std::vector<Value> values_of(const Schema& schema, const std::vector<uint8_t>& message) {
-  std::vector<Value> values;
+uint64_t mixed(uint64_t hash, uint64_t more) {  // the steps of splitmix64
+  hash = (hash ^ more) + 0x9E3779B97F4A7C15;
+  hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9;
+  return hash ^ (hash >> 31);
+}
+
+// values: written over; its memory is used again.
+void read_values(const Schema& schema, const std::vector<uint8_t>& message,
+                 std::vector<Value>& values) {
+  values.clear();
   visit_message(schema, message, [&](const FieldPath& path, const FieldValue& value) {
-    values.push_back({path.str(), path.pattern(), value});
+    uint64_t pattern = 0, indices = 0;
+    for (const FieldPath::Part& part : path.parts) {
+      pattern = mixed(pattern, reinterpret_cast<uintptr_t>(part.field));
+      for (const int64_t index : part.indices)
+        indices = mixed(indices, static_cast<uint64_t>(index));
+    }
+    values.push_back({pattern, mixed(pattern, indices), value});
     return true;
   });
-  return values;
+}
+
+// Of the first value there.
+FieldPath path_of(const Schema& schema, const std::vector<uint8_t>& message, size_t index) {
+  FieldPath found;
+  visit_message(schema, message, [&](const FieldPath& path, const FieldValue&) {
+    if (index-- > 0) return true;
+    found = path;
+    return false;
+  });
+  return found;
+}
+
+bool are_aligned(const std::vector<Value>& golden, const std::vector<Value>& other) {
+  return std::ranges::equal(golden, other,
+                            [](const Value& a, const Value& b) { return a.place == b.place; });
 }
 
 using Events = std::map<std::string, std::vector<Event>>;  // of one time, by channel
@@ -130,12 +159,12 @@ class Comparison {
     if (schema != nullptr) channel.type = schema->name;
     if (schema == nullptr || !well_formed(*schema, golden.data) ||
         !well_formed(*schema, other.data)) {
-      note(channel, golden.timestamp_us, {"(bytes)", "(bytes)", {}},
+      note(channel, golden.timestamp_us, "(bytes)", "(bytes)",
            std::to_string(golden.data.size()) + " bytes",
            std::to_string(other.data.size()) + " bytes");
       return;
     }
-    fields(channel, golden, values_of(*schema, golden.data), values_of(*schema, other.data));
+    fields({golden.channel, channel, *schema, golden, other, known_[golden.channel]});
   }
 
   void only(const Event& event, bool in_golden) {
@@ -187,60 +216,104 @@ class Comparison {
     return nullptr;
   }
 
-  bool good(const std::string& channel, const Value& golden, const Value& other) const {
-    const bool both = golden.value && other.value;
-    if (both && passes(*golden.value, *other.value, nullptr)) return true;
-    const DiffRule* rule = rule_of(channel, golden.pattern);
-    return rule && (rule->ignore || (both && passes(*golden.value, *other.value, rule)));
+  // What is known of a field of a channel, once a value of it differed.
+  struct Known {
+    std::string pattern;
+    const DiffRule* rule = nullptr;
+    FieldDifference* difference = nullptr;  // null: within the tolerance until now
+    uint64_t first_place = 0;
+  };
+
+  // Two messages of a channel that are not the same bytes.
+  struct Pair {
+    const std::string& name;
+    ChannelDifference& channel;
+    const Schema& schema;
+    const Event &golden, &other;
+    std::unordered_map<uint64_t, Known>& known;  // by pattern
+  };
+
+  // Arrays of other lengths shift what follows, so values are matched by their places.
+  void fields(const Pair& pair) {
+    read_values(pair.schema, pair.golden.data, golden_);
+    read_values(pair.schema, pair.other.data, other_);
+    if (are_aligned(golden_, other_)) {
+      for (size_t i = 0; i < golden_.size(); ++i) compare(pair, &golden_[i], &other_[i]);
+      return;
+    }
+    std::unordered_map<uint64_t, const Value*> by_place;
+    for (const Value& value : other_) by_place.emplace(value.place, &value);
+    for (const Value& value : golden_) {
+      const auto match = by_place.find(value.place);
+      compare(pair, &value, match == by_place.end() ? nullptr : match->second);
+      if (match != by_place.end()) by_place.erase(match);
+    }
+    for (const Value& value : other_) {
+      if (by_place.contains(value.place)) compare(pair, nullptr, &value);
+    }
   }
 
-  // Arrays of other lengths shift what follows, so values are matched by their paths, which come in
-  // one order.
-  void fields(ChannelDifference& channel, const Event& event, const std::vector<Value>& golden,
-              const std::vector<Value>& other) {
-    std::map<std::string_view, const Value*> by_path;
-    for (const Value& value : other) by_path.emplace(value.path, &value);
-    for (const Value& value : golden) {
-      const auto match = by_path.find(value.path);
-      const Value absent{value.path, value.pattern, {}};
-      const Value& counterpart = match == by_path.end() ? absent : *match->second;
-      if (match != by_path.end()) by_path.erase(match);
-      if (!good(event.channel, value, counterpart))
-        differ(channel, event.timestamp_us, value, counterpart);
+  // Null: absent.
+  void compare(const Pair& pair, const Value* golden, const Value* other) {
+    const bool both = golden && other;
+    if (both && passes(golden->value, other->value, nullptr)) return;
+    const Value& place = golden ? *golden : *other;
+    const auto path = [&] {
+      const auto index = static_cast<size_t>(&place - (golden ? golden_ : other_).data());
+      return path_of(pair.schema, (golden ? pair.golden : pair.other).data, index);
+    };
+    const auto [at, fresh] = pair.known.try_emplace(place.pattern);
+    Known& known = at->second;
+    if (fresh) {
+      known.pattern = path().pattern();
+      known.rule = rule_of(pair.name, known.pattern);
     }
-    for (const Value& value : other) {
-      if (!by_path.contains(value.path)) continue;
-      const Value absent{value.path, value.pattern, {}};
-      if (!good(event.channel, absent, value)) differ(channel, event.timestamp_us, absent, value);
+    if (known.rule &&
+        (known.rule->ignore || (both && passes(golden->value, other->value, known.rule))))
+      return;
+    if (!known.difference) {
+      const auto text = [](const Value* value) {
+        return value ? to_string(value->value) : "(absent)";
+      };
+      known.difference = &note(pair.channel, pair.golden.timestamp_us, known.pattern, path().str(),
+                               text(golden), text(other));
+      known.first_place = place.place;
+    } else {
+      ++known.difference->count;
     }
+    if (both)
+      measure(*known.difference, pair.golden.timestamp_us, *golden, *other,
+              place.place == known.first_place);
   }
 
-  static FieldDifference& note(ChannelDifference& channel, SimTime time, const Value& place,
-                               const std::string& golden, const std::string& other) {
-    FieldDifference& field = channel.fields[place.pattern];
+  static void measure(FieldDifference& field, SimTime time, const Value& golden, const Value& other,
+                      bool is_first) {
+    const auto then = number_of(golden.value), now = number_of(other.value);
+    if (!then || !now) return;
+    field.worst = std::max(field.worst, static_cast<double>(std::abs(*now - *then)));
+    if (is_first && field.samples.size() < kMaxSamples)
+      field.samples.push_back({time, static_cast<double>(*then), static_cast<double>(*now)});
+  }
+
+  static FieldDifference& note(ChannelDifference& channel, SimTime time, const std::string& pattern,
+                               const std::string& path, const std::string& golden,
+                               const std::string& other) {
+    FieldDifference& field = channel.fields[pattern];
     if (field.count++ == 0) {
       field.first_time = time;
-      field.first_path = place.path;
+      field.first_path = path;
       field.first_golden = golden;
       field.first_other = other;
     }
     return field;
   }
 
-  static void differ(ChannelDifference& channel, SimTime time, const Value& golden,
-                     const Value& other) {
-    FieldDifference& field = note(channel, time, golden, golden.text(), other.text());
-    const auto then = golden.value ? number_of(*golden.value) : std::nullopt;
-    const auto now = other.value ? number_of(*other.value) : std::nullopt;
-    if (!then || !now) return;
-    field.worst = std::max(field.worst, static_cast<double>(std::abs(*now - *then)));
-    if (golden.path == field.first_path && field.samples.size() < kMaxSamples)
-      field.samples.push_back({time, static_cast<double>(*then), static_cast<double>(*now)});
-  }
-
   Diff& diff_;
   const std::vector<DiffRule>& rules_;
   std::map<std::string, std::set<std::string>> met_;  // with the types of its messages; "": unknown
+  std::unordered_map<std::string, std::unordered_map<uint64_t, Known>>
+      known_;                          // by channel, pattern
+  std::vector<Value> golden_, other_;  // of the messages that are compared
 };
 
 // Hands out the events of one timestamp after the other, without the header.

@@ -3,12 +3,13 @@ page.
 """
 
 import os
+import resource
 import subprocess
 from xml.etree import ElementTree
 
 import lcm
 import pytest
-from ruedo.lcmtypes import pose_t
+from ruedo.lcmtypes import planar_lidar_t, pose_t
 
 RUEDO = os.environ["RUEDO"]
 
@@ -134,3 +135,47 @@ def test_what_cannot_be_read_is_said(logs, tmp_path):
     assert done.returncode == 3 and "nowhere.lcm" in done.stderr
     done = diff(*logs, "--html", "/nowhere/page.html")
     assert done.returncode == 4 and "/nowhere/page.html" in done.stderr
+
+
+def scans(path, every):
+    """A log of scans, each with these ranges."""
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    for k, ranges in enumerate(every):
+        scan = planar_lidar_t()
+        scan.utime, scan.nranges, scan.ranges = 1000 * k, len(ranges), ranges
+        log.write_event(scan.utime, "r/lrf", scan.encode())
+    log.close()
+    return path
+
+
+def test_arrays_of_other_lengths_are_matched_by_their_places(tmp_path):
+    golden = scans(tmp_path / "golden.lcm", [[1.0, 2.0, 3.0], [1.0, 2.0]])
+    new = scans(tmp_path / "new.lcm", [[1.0, 2.5, 3.0, 4.0], [1.0]])
+    said = diff(golden, new).stdout
+    assert "nranges of r/lrf at 0.000000 s: golden 3, new 4 (2 values differ, by 1 at most)" in said
+    assert (
+        "ranges[1] of r/lrf at 0.000000 s: golden 2, new 2.5 (3 values differ, by 0.5 at most)"
+        in said
+    )
+    assert diff(new, golden, "--ignore", "r/lrf:*ranges").returncode == 0
+    assert diff(golden, new, "--tolerance", "*:ranges=abs:1", "--ignore", "*:nranges").returncode
+
+
+def test_logs_that_differ_everywhere_take_little_longer_than_equal_ones(tmp_path):
+    """Each of two million values was written as text: it took twenty times as long."""
+    even = [float(i) for i in range(1000)]
+    golden = scans(tmp_path / "golden.lcm", [even] * 2000)
+    new = scans(tmp_path / "new.lcm", [[one + 0.5 for one in even]] * 2000)
+
+    def seconds(*logs):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = diff(*logs)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done
+
+    (equal, _), (differ, done) = (
+        min((seconds(golden, other) for _ in range(3)), key=lambda one: one[0])
+        for other in (golden, new)
+    )
+    assert "(2000000 values differ, by 0.5 at most)" in done.stdout
+    assert differ < 8 * equal, (equal, differ)
