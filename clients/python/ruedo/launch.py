@@ -98,8 +98,7 @@ def launch(
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     options += ["--allow-absolute"] * isinstance(world, World)  # this program chose its files
     port = _free_port() if view else 0
-    if port:
-        options += ["--view", str(port)]
+    options += ["--view", str(port)] if port else []
     program = find_ruedo()
     file, folder = _world_file(world, text)
     url, token = _address(url)

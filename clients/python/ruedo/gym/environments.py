@@ -339,7 +339,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         outcome = Outcome(
             np.asarray(rewards, np.float64), np.asarray(success, bool), np.asarray(failure, bool)
         )
-        for name, values in zip(Outcome._fields, outcome):
+        for name, values in zip(("rewards", "success", "failure"), outcome):
             if values.shape != (self.num_envs,):
                 raise ValueError(
                     f"{type(self.task).__name__}.outcome() gives {name} of the shape {values.shape}, "

@@ -73,9 +73,8 @@ class Push(DriveTask):
         before, self._apart = self._apart, self._distances()
         nearer = before - self._apart
         success = self._apart[:, 0] < PLACE_M
-        outcome = self.rewarded(nearer[:, 0], success, np.zeros_like(success))
-        rewards = outcome.rewards + self.weights["approach"] * nearer[:, 1]
-        return outcome._replace(rewards=rewards)
+        rewards, *ends = self.rewarded(nearer[:, 0], success, np.zeros_like(success))
+        return Outcome(rewards + self.weights["approach"] * nearer[:, 1], *ends)
 
     def terms(self) -> Terms:
         heading, of_box = self.heading("robot"), self.heading("box")
