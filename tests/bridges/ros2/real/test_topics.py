@@ -312,6 +312,10 @@ def test_processes_that_begin_at_once_all_hear(run):
     assert run.process.poll() is None
 
 
+def children(messages):
+    return {each.child_frame_id for message in messages for each in message.transforms}
+
+
 def test_two_robots_have_a_namespace_each(peers):
     with Run("--no-noise", "--disable", "p3at/camera", "--spawn", "turtle@3,0") as run:
         peer = peers(run)
@@ -319,9 +323,15 @@ def test_two_robots_have_a_namespace_each(peers):
         peer.spin_until(lambda: own <= set(peer.topics()), "topics of both")
         assert not {"/scan", "/cmd_vel"} & set(peer.topics())
         scans = {robot: peer.hear(LaserScan, f"/{robot}/scan") for robot in ("p3at", "turtle")}
-        peer.spin_until(lambda: all(scans.values()), "scans of both")
+        trees = {robot: peer.hear(TFMessage, f"/{robot}/tf", 100) for robot in scans}
+        all_trees = peer.hear(TFMessage, "/tf", 100)
+        heard = [*scans.values(), *trees.values(), all_trees]
+        peer.spin_until(lambda: all(heard), "scans and frames of both")
         for robot, messages in scans.items():
             assert messages[0].header.frame_id.startswith(f"{robot}/")
+            assert "base_link" in children(trees[robot])
+            assert not any("/" in child for child in children(trees[robot]))
+        assert all("/" in child for child in children(all_trees))
 
 
 def test_diagnostics_tell_how_the_run_gets_on(peer):
