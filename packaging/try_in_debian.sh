@@ -14,7 +14,7 @@ shift 2
 fetch_wheels() {
   local version=$1 to=$2 platforms=() glibc
   for glibc in {36..5}; do platforms+=(--platform "manylinux_2_${glibc}_x86_64"); done
-  local what=(pytest "ruedo[camera,gym,logs,campaign,hunt]")
+  local what=(pytest "ruedo[camera,gym,logs,campaign,hunt,fit]")
   [[ ${RUEDO_TESTS-} != none ]] || what=("ruedo[camera]")
   mkdir -p "$to"
   rm -f "$to"/ruedo[-_]*

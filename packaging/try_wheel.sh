@@ -46,7 +46,7 @@ except ImportError as error: assert "3.11" in str(error), error'
 fi
 
 [[ ${RUEDO_TESTS-} != none ]] || exit 0
-venv/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[gym,logs,campaign,hunt]' pytest
+venv/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[gym,logs,campaign,hunt,fit]' pytest
 export RUEDO=$PWD/venv/bin/ruedo RUEDO_SOURCE_DIR=$source RUEDO_BUILD_DIR=/nowhere PYTHONDONTWRITEBYTECODE=1 PATH=$PWD/venv/bin:$PATH
 # Left out: clients in other languages, LCM programs without Ruedo (LCM's wheel has no GLib), what wants a compiler, cmake, ip, libfaketime
 # or user namespaces, and Ray.
@@ -60,5 +60,6 @@ if $engine; then
   run_tests clients labs_test.py
   run_tests engine test_{engine,gym,randomize,policy}.py
   run_tests campaign test_{spec,run,controllers,faults,hunt}.py
+  run_tests fit test_{readers,odometry,import,rangefinder,streams}.py
 fi
 exit $failed

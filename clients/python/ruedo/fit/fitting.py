@@ -21,6 +21,7 @@ from .odometry import OdometryFit, fit_odometry
 from .rangefinder import BeamModel, fit_rangefinder
 from .recording import Array, Geometry, Recording, body_steps
 from .robot_file import Setting, write_fitted
+from .streams import fit_imu, fit_timing
 
 
 @dataclass
@@ -123,6 +124,10 @@ def fit(
     _fit_drive(answer, robot)
     if any(one.scans is not None for one in recordings):
         _fit_scans(answer, robot, mount)
+    if timing := fit_timing(recordings):
+        answer.parts["Timing"] = timing
+    if recordings[0].imu is not None:
+        answer.parts["IMU"] = fit_imu(recordings[0])
     if not answer.parts:
         raise FitError("; ".join(answer.remarks))
     return answer

@@ -86,7 +86,7 @@ def wheels_of(recording: Recording, geometry: Geometry) -> tuple[Array, Array, A
     return odometry.time, turned, None
 
 
-def _run(recording: Recording, drive: Drive) -> Run:
+def run_of(recording: Recording, drive: Drive) -> Run:
     recording.need("truth", "the robot's path is needed (motion capture, SLAM, simulation)")
     truth = recording.truth
     assert truth is not None
@@ -140,7 +140,7 @@ def fit_odometry(
     Raises FitError for a log without a path, without wheels, or in which little is driven.
     """
     drive = Drive(geometry)
-    runs = [_run(one, drive) for one in recordings]
+    runs = [run_of(one, drive) for one in recordings]
     values = np.append(drive.nominal(), np.zeros(3))
     scale = np.append(drive.scale(), np.ones(3))
     size = len(drive.names)
@@ -262,10 +262,6 @@ def _spreads(fit: OdometryFit, residuals: list[Array], runs: list[Run]) -> list[
     return answer
 
 
-def dead_reckoning(drive: Drive, parameters: Array, run: Run, start: Array) -> Array:
-    return integrate(drive.moved(parameters, run.turned, run.steering), start)
-
-
 def _end_errors(fit: OdometryFit, run: Run) -> tuple[float, float]:
     """m at the end of the drive, with the nominal and with the fitted values."""
     nominal = end_error(fit.drive, fit.drive.nominal(), fit.place, run)
@@ -274,19 +270,20 @@ def _end_errors(fit: OdometryFit, run: Run) -> tuple[float, float]:
 
 def end_error(drive: Drive, parameters: Array, place: Array, run: Run) -> float:
     """Distance (m) between the tracked point and where dead reckoning has it, at the end."""
-    x, y, heading = place
-    start = run.pose[0] - [0, 0, heading]
-    start[:2] -= _rotated(start[2], x, y)
-    end = dead_reckoning(drive, parameters, run, start)[-1]
+    x, y, _ = place
+    moved = drive.moved(parameters, run.turned, run.steering)
+    end = integrate(moved, reckoned_from(run, place))[-1]
     return float(np.hypot(*(end[:2] + _rotated(end[2], x, y) - run.pose[-1, :2])))
+
+
+def reckoned_from(run: Run, place: Array) -> Array:
+    """Pose of base_link at the first reading, where the tracked point is at `place` on it."""
+    start = run.pose[0] - [0, 0, place[2]]
+    start[:2] -= _rotated(start[2], place[0], place[1])
+    return start
 
 
 def _rotated(heading: float, x: float, y: float) -> Array:
     return np.array(
         [np.cos(heading) * x - np.sin(heading) * y, np.sin(heading) * x + np.cos(heading) * y]
     )
-
-
-def held_out(recording: Recording, fit: OdometryFit) -> tuple[float, float]:
-    """End errors (m) on another drive: nominal, and with this fit."""
-    return _end_errors(fit, _run(recording, fit.drive))
