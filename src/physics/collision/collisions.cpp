@@ -41,8 +41,9 @@ class Pair : public btCollisionAlgorithm {
   Pair& operator=(const Pair&) = delete;
 
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
-                        const btDispatcherInfo&, btManifoldResult* result) override {
+                        const btDispatcherInfo& info, btManifoldResult* result) override {
     if (!manifold_) return;
+    substep_s = info.m_timeStep;
     result->setPersistentManifold(manifold_);
     collide(*a, *b, *result);
     if (own_) result->refreshContactPoints();
@@ -54,6 +55,9 @@ class Pair : public btCollisionAlgorithm {
   void getAllContactManifolds(btManifoldArray& manifolds) override {
     if (own_) manifolds.push_back(manifold_);
   }
+
+ protected:
+  btScalar substep_s = 0.0;
 
  private:
   virtual void collide(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
@@ -268,7 +272,7 @@ class ConvexOnTriangle final : public Pair {
     }
     Deepest deepest{of_a, of_b, X_WA, X_WB};
     deepest.ask_bullet();
-    const btVector3 apart = X_WA.getOrigin() - X_WB.getOrigin();
+    const btVector3 apart = center_before(a, substep_s) - center_before(b, substep_s);
     for_each_side(of_a, X_WA, -apart, [&](const btVector3& n) { deepest.look(-n); });
     for_each_side(of_b, X_WB, apart, [&](const btVector3& n) { deepest.look(n); });
     for_each_side(of_b, X_WB, apart, [&](const btVector3& n) {

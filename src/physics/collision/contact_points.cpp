@@ -66,8 +66,8 @@ void choose(Found* points, size_t to, size_t count, Of&& of) {
   std::rotate(points + to, points + best, points + best + 1);
 }
 
-// Puts those four first that enclose the most: of the lowest, if these are enough; otherwise these,
-// and of the others that may touch in this substep those far from them.
+// Puts those four first that enclose the most of what may touch in this substep, among them the
+// lowest. Where fewer than four are as low as that, these, and of the others those far from them.
 void choose_four(Found* points, size_t count, btScalar level) {
   std::stable_sort(points, points + count, [](const Found& a, const Found& b) {
     return a.point.m_distance1 < b.point.m_distance1;
@@ -92,20 +92,22 @@ void choose_four(Found* points, size_t count, btScalar level) {
     }
     return;
   }
-  btVector3 middle(0, 0, 0);
-  for (size_t i = 0; i < low; ++i)
-    middle += points[i].point.m_positionWorldOnB / static_cast<btScalar>(low);
   const auto at = [points](size_t i) { return points[i].point.m_positionWorldOnB; };
-  choose(points, 0, low,
-         [&](const btManifoldPoint& p) { return (p.m_positionWorldOnB - middle).length2(); });
-  choose(points, 1, low,
+  // The lowest may lie on a line, or all at one end: what is a little higher would fall.
+  if (near == low) {
+    btVector3 middle(0, 0, 0);
+    for (size_t i = 0; i < low; ++i) middle += at(i) / static_cast<btScalar>(low);
+    choose(points, 0, low,
+           [&](const btManifoldPoint& p) { return (p.m_positionWorldOnB - middle).length2(); });
+  }
+  choose(points, 1, near,
          [&](const btManifoldPoint& p) { return (p.m_positionWorldOnB - at(0)).length2(); });
   const btVector3 n = points[0].point.m_normalWorldOnB, across = n.cross(at(1) - at(0));
-  choose(points, 2, low, [&](const btManifoldPoint& p) {
+  choose(points, 2, near, [&](const btManifoldPoint& p) {
     return btFabs(across.dot(p.m_positionWorldOnB - at(0)));
   });
   const btScalar side = across.dot(at(2) - at(0)) < 0.0 ? -1.0 : 1.0;
-  choose(points, 3, low, [&](const btManifoldPoint& p) {
+  choose(points, 3, near, [&](const btManifoldPoint& p) {
     return -side * across.dot(p.m_positionWorldOnB - at(0));
   });
 }
@@ -193,12 +195,14 @@ void see_ahead(btCollisionObject& object, btScalar by) {
 }  // namespace
 
 struct ContactPoints::Placed {
+  const btCollisionObjectWrapper& wrapper;
   const btConvexShape& shape;
   const btTransform& X;
   const btCollisionObject& object;
   Face face;
   Placed(const btCollisionObjectWrapper& of, const btVector3& direction)
-      : shape(static_cast<const btConvexShape&>(*of.getCollisionShape())),
+      : wrapper(of),
+        shape(static_cast<const btConvexShape&>(*of.getCollisionShape())),
         X(of.getWorldTransform()),
         object(*of.getCollisionObject()),
         face(face_towards(shape, X, direction)) {}
@@ -240,7 +244,8 @@ void ContactPoints::find_better_normal(const Placed& a, const Placed& b, Touch& 
   if (b.face.count <= 2) return;
   const btVector3 outward = b.face.normal();
   const bool triangle = b.shape.getShapeType() == TRIANGLE_SHAPE_PROXYTYPE;
-  const btScalar side = outward.dot(triangle ? a.X.getOrigin() - b.face.corners[0] : normal);
+  const btScalar side = outward.dot(
+      triangle ? center_before(a.wrapper, scratch_.substep_s) - b.face.corners[0] : normal);
   if (take(side < 0.0 ? -outward : outward)) touch.of_a_triangle = triangle;
 }
 

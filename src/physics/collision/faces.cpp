@@ -184,6 +184,15 @@ Face face_towards(const btCollisionShape& shape, const btTransform& X, const btV
   return face;
 }
 
+btVector3 center_before(const btCollisionObjectWrapper& placed, btScalar substep_s) {
+  const btCollisionShape& shape = *placed.getCollisionShape();
+  const btTransform& X = placed.getWorldTransform();
+  if (shape.getShapeType() == TRIANGLE_SHAPE_PROXYTYPE)
+    return X * static_cast<const btTriangleShape&>(shape).m_vertices1[0];
+  const auto* body = btRigidBody::upcast(placed.getCollisionObject());
+  return body ? X.getOrigin() - substep_s * body->getLinearVelocity() : X.getOrigin();
+}
+
 void for_each_side(const btCollisionShape& shape, const btTransform& X, const btVector3& towards,
                    const std::function<void(const btVector3&)>& act) {
   const btMatrix3x3& R = X.getBasis();

@@ -49,7 +49,7 @@ class Part {
   double hull_volume() const { return hull_volume_; }
   double excess() const { return hull_volume_ - volume_; }
   double section() const { return std::abs(section_); }  // the area of the last cut
-  std::vector<Eigen::Vector3d> corners() const;  // its hull is the part's
+  std::vector<Eigen::Vector3d> corners() const;          // its hull is the part's
 
  private:
   Part() = default;
