@@ -81,7 +81,8 @@ class ContactList {
   void exchange(Archive& archive) {
     std::vector<Contact> resting = resting_ ? *resting_ : std::vector<Contact>();
     archive(moving_, resting);
-    if (archive.reads()) resting_ = std::make_shared<const std::vector<Contact>>(std::move(resting));
+    if (archive.reads())
+      resting_ = std::make_shared<const std::vector<Contact>>(std::move(resting));
   }
 
  private:
@@ -139,7 +140,7 @@ struct Snapshot {
   IndexedVector<RobotIndex, RobotState> robots;
   std::vector<MotionEnd> motion_ends;  // by robot, then in the order of the commands
   ContactList contacts;
-  std::vector<Collision> collisions;   // by robot, then in the order of the contacts
+  std::vector<Collision> collisions;  // by robot, then in the order of the contacts
   // Bodies that may differ from those of the state before, in order.
   std::vector<BodyIndex> moving;
   // Of which world these are the bodies and joints, and its state: what read them knows what has

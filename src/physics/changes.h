@@ -1,5 +1,5 @@
-// Which bodies changed in which of the last states: a snapshot that holds an earlier state is brought
-// up to date without reading again what rests.
+// Which bodies changed in which of the last states: a snapshot that holds an earlier state is
+// brought up to date without reading again what rests.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@ namespace ruedo::physics {
 
 class Changes {
  public:
-  // No earlier state of these bodies can be brought up to date: it was another world's, or they were
-  // replaced.
+  // No earlier state of these bodies can be brought up to date: it was another world's, or they
+  // were replaced.
   void forget(size_t bodies);
   // A new state, in which these bodies may differ from the last one; some may be there twice.
   void add_state(const std::vector<BodyIndex>& changed);
@@ -26,9 +26,9 @@ class Changes {
  private:
   static constexpr uint64_t kStates = 256;  // more than a run has in flight
   Snapshot::Source source_;
-  std::vector<BodyIndex> ring_;               // changes of all states, in order
-  uint64_t changes_ = 0;                      // how many there were
-  std::array<uint64_t, kStates> end_{};       // by a state's number: how many there were then
+  std::vector<BodyIndex> ring_;                // changes of all states, in order
+  uint64_t changes_ = 0;                       // how many there were
+  std::array<uint64_t, kStates> end_{};        // by a state's number: how many there were then
   IndexedVector<BodyIndex, uint64_t> latest_;  // a body's last change, as its number
 };
 

@@ -738,8 +738,8 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) {
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());
   snapshot.joint_efforts.resize(joints_.size());
-  const bool known = changes_.for_each_since(
-      snapshot.source, [&](BodyIndex body) { read_body(body, snapshot); });
+  const bool known =
+      changes_.for_each_since(snapshot.source, [&](BodyIndex body) { read_body(body, snapshot); });
   if (known) {
     for (const BodyIndex body : busy_) read_body(body, snapshot);  // also changed since the step
   } else {

@@ -184,13 +184,13 @@ class PhysicsWorld::Impl {
   Surfaces surfaces_;
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
-  std::vector<btRigidBody*> simulated_[2];             // for each substep length
+  std::vector<btRigidBody*> simulated_[2];  // for each substep length
   // Bodies that may move in this step, and what they could reach, in order; between two steps those
   // that the next one considers, in any order. What sleeps together is not among them.
   std::vector<BodyIndex> busy_;
-  std::vector<BodyIndex> considered_, spreading_;                // scratch
+  std::vector<BodyIndex> considered_, spreading_;  // scratch
   Changes changes_;
-  bool any_fresh_ = true;  // a body may be
+  bool any_fresh_ = true;                                        // a body may be
   IndexedVector<BodyIndex, std::vector<JointIndex>> joints_of_;  // those that move it
   IndexedVector<BodyIndex, std::vector<WheelJointIndex>> wheels_of_;
   std::vector<JointIndex> busy_joints_[2];  // for each substep length, in order

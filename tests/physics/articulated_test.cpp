@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "world.h"
 
@@ -189,6 +190,52 @@ TEST(Articulated, StopsHoldWhatMotorsDrive) {
       EXPECT_NEAR(w.physics.joint_position(joint), 0.4 * rate, 1e-4) << joint;
       EXPECT_NEAR(w.physics.joint_effort(joint), 100.0 * rate, 1e-6) << joint;
     }
+  }
+}
+
+std::string chain(int n, const std::string& limit) {
+  std::string model = "<model name='m'>", before = "world";
+  for (int i = 0; i < n; ++i) {
+    const std::string name = "l" + std::to_string(i);
+    model += "<link name='" + name + "'><pose>" + std::to_string(0.1 * i) + " 0 1 0 0 0</pose>" +
+             inertial("0.05 0 0 0 0 0", 0.1, 1e-4, 1e-4, 1e-4) + "</link>" +
+             hinge("j" + std::to_string(i), before, name, "0 1 0",
+                   "<limit><lower>-" + limit + "</lower><upper>" + limit + "</upper></limit>");
+    before = name;
+  }
+  return model + "</model>";
+}
+
+// A chain droops until each joint is at its stop, and rests there: that costs about what swinging
+// does (it was 39 times as much, and did not come to rest, while stops were relaxed one by one).
+TEST(Articulated, StopsOfAChainAreSolvedAtOnce) {
+  constexpr int kLinks = 60, kSteps = 100;
+  constexpr double kLimit = 0.002, kFactor = 8.0;
+  World stopped(chain(kLinks, "0.002"), 5000), swinging(chain(kLinks, "3"), 5000);
+  for (World* w : {&stopped, &swinging}) w->run(0.1);
+  EXPECT_LT(stopped.seconds_of(kSteps), kFactor * swinging.seconds_of(kSteps));
+  stopped.run(1.4);
+  for (const JointIndex i : stopped.layout.joints.indices()) {
+    EXPECT_NEAR(stopped.physics.joint_position(i), kLimit, 2e-4) << i;
+    EXPECT_NEAR(stopped.physics.joint_velocity(i), 0.0, 1e-6) << i;
+  }
+}
+
+// A motor without a maximum that drives into a stop gives nothing there, one that holds a load off
+// it gives what the load needs.
+TEST(Articulated, AMotorAtAStopGivesWhatIsNeeded) {
+  const auto arm = [](const std::string& limit) {
+    return "<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
+           inertial("0.5 0 0 0 0 0", 2, 0.1, 0.1, 0.1) + "</link>" +
+           hinge("j", "world", "a", "0 1 0", limit) + "</model>";
+  };
+  for (const double rate : {0.3, -0.3}) {  // downwards, upwards
+    World w(arm("<limit><lower>-0.1</lower><upper>0.1</upper></limit>"), 5000);
+    w.physics.drive_joint_velocity(JointIndex(0), rate, std::numeric_limits<double>::infinity());
+    w.run(2.0);
+    const double load = 2 * 10 * 0.5 * std::cos(0.1);  // N m
+    EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), std::copysign(0.1, rate), 1e-4);
+    EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), rate > 0.0 ? 0.0 : -load, 1e-2);
   }
 }
 

@@ -61,7 +61,7 @@ TEST(StateCheck, NamesWhatIsNotFinite) {
               HasSubstr("the joint 'm/j'"));
   EXPECT_THAT(error_with([](Snapshot& s) {
                 s.contacts.moving().push_back({}), s.contacts.moving().back().body_b = BodyIndex(1),
-                                          s.contacts.moving().back().force = kNaN;
+                                                   s.contacts.moving().back().force = kNaN;
               }),
               HasSubstr("a contact of the body 'm/b'"));
 }

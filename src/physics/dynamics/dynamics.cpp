@@ -105,10 +105,11 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
   if (bodies_.empty()) return;
   for (btRigidBody* body : bodies_) {
     if (body->isStaticOrKinematicObject()) continue;  // the other one of a pair can be moved
-    near_.for_each_pair(body->getBroadphaseHandle(), [&](btBroadphasePair& pair,
-                                                         const btCollisionObject& partner) {
-      if (!can_be_moved(partner) || number(*body) < number(partner)) pairs_.push_back(&pair);
-    });
+    near_.for_each_pair(body->getBroadphaseHandle(),
+                        [&](btBroadphasePair& pair, const btCollisionObject& partner) {
+                          if (!can_be_moved(partner) || number(*body) < number(partner))
+                            pairs_.push_back(&pair);
+                        });
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const btBroadphasePair* a, const btBroadphasePair* b) {
     return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) <

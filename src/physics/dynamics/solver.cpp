@@ -502,7 +502,7 @@ void Solver::undo_penetration() {
   for (size_t c = 0; c < contact_count_; ++c) any |= contacts_[c].normal.push_target > 0.0;
   if (!any) return;
   for (int i = 0; i < kPushSweeps; ++i) {
-    double worst = blocks_.sweep_push(bodies_);
+    double worst = blocks_.sweep_push(bodies_, true);
     for (size_t c = 0; c < contact_count_; ++c) {
       Row& row = contacts_[c].normal;
       if (contacts_[c].gap > 0.0 || contacts_[c].soft) continue;
@@ -520,14 +520,20 @@ void Solver::undo_penetration() {
 // correction is part of their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical
 // integration of the cartesian equations of motion of a system with constraints", 1977: SHAKE): a
 // pendulum keeps its energy. Errors that motion did not cause are corrected without changing
-// velocities.
+// velocities, and so is what went beyond a stop: it would rebound.
 void Solver::close_joints(double substep_s) {
   if (blocks_.empty()) return;
   for (SolverBody& s : bodies_) s.push_v = s.push_w = Vec3::Zero();
   const double largest = blocks_.look_again(substep_s);
   if (largest <= 0.0) return;
-  blocks_.sweep_push(bodies_);
-  const bool kept = largest < kFastestClosing_m_s;
+  if (largest < kFastestClosing_m_s) {
+    blocks_.sweep_push(bodies_, false);
+    for (SolverBody& s : bodies_) {
+      s.v += bounded(s.push_v);
+      s.w += bounded(s.push_w);
+    }
+  }
+  blocks_.sweep_push(bodies_, true);
   for (size_t i = 1; i < bodies_.size(); ++i) {
     SolverBody& s = bodies_[i];
     if (s.push_v == Vec3::Zero() && s.push_w == Vec3::Zero()) continue;
@@ -538,9 +544,6 @@ void Solver::close_joints(double substep_s) {
     X.setRotation(to_bt(turned_by(from_bt(X.getRotation()), substep_s * s.push_w)));
     s.bullet->setWorldTransform(X);
     s.bullet->updateInertiaTensor();
-    if (!kept) continue;
-    s.v += s.push_v;
-    s.w += s.push_w;
   }
 }
 

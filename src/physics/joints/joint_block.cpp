@@ -3,9 +3,10 @@
 // For a row with bounds (a motor's maximum torque, a stop) it is not known in advance whether it is
 // at one. All motors start among the rows that are solved directly; one that exceeds its bounds is
 // relaxed iteratively with the others of that kind for the rest of the substep. In a tree such a
-// motor gives its maximum, and holds again where that is too much: motors are exchanged between the
-// sets of those that hold and those at a bound until none is wrong (principal pivoting; K. Murty,
-// "Note on a Bard-type scheme for solving the complementarity problem", 1974).
+// motor gives its maximum, and holds again where that is too much; a stop holds while it is pushed.
+// Motors and stops are exchanged between the sets of those that hold and the others until none is
+// wrong (principal pivoting; K. Murty, "Note on a Bard-type scheme for solving the complementarity
+// problem", 1974).
 #include "physics/joints/joint_block.h"
 
 #include <algorithm>
@@ -299,9 +300,19 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
   joint.count = rows_.size() - joint.first;
   way_of_row_.resize(rows_.size(), JointTree::kNone);
   bool led = false;  // a tree can prescribe one degree of freedom only once
+  Stop* stop = nullptr;
+  if (block.is_tree && joint.stop && joint.way != JointTree::kNone) {
+    const Row& row = rows_[joint.first];
+    if (row.inverse > 0.0 && row.softness == 0.0 && is_stop(row)) {
+      stop = &block.stops.emplace_back();
+      stop->row = joint.first;
+      stop->way = joint.way;
+      stop->sign = (row.linear_b + row.angular_b).dot(joint.ways.axis) < 0.0 ? -1.0 : 1.0;
+    }
+  }
   for (size_t i = joint.first; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
-    if (row.inverse == 0.0) continue;
+    if (row.inverse == 0.0 || (stop && i == stop->row)) continue;
     const bool of_tree = block.is_tree && i >= first_motor;
     if (of_tree) way_of_row_[i] = joint.way;
     if (of_tree && led && i == damper) {
@@ -311,7 +322,10 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
     }
     const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !(of_tree && led) &&
                         (block.is_tree || block.free.size() < kMostRowsAtOnce);
-    (direct ? block.free : block.bounded).push_back(i);
+    if (stop && of_tree && direct)
+      stop->motor = i;
+    else
+      (direct ? block.free : block.bounded).push_back(i);
     led |= of_tree && direct;
   }
 }
@@ -462,6 +476,7 @@ void JointBlocks::find_blocks(const SolverBodies& bodies) {
       for (auto* list : {&blocks_[block].joints, &blocks_[block].free, &blocks_[block].bounded})
         list->clear();
       blocks_[block].spent.clear();
+      blocks_[block].stops.clear();
       blocks_[block].bodies = blocks_[block].hung = 0;
       blocks_[block].factored = false;
     }
@@ -575,6 +590,8 @@ void JointBlocks::factor(Block& block) {
   for (const Spent& spent : block.spent)
     if (const Row* damper = damper_of(spent.row))
       block.tree.lead(way_of_row_[spent.row], damper->softness);
+  for (const Stop& stop : block.stops)
+    if (stop.holds) block.tree.lead(stop.way, 0.0);
   block.tree.factor();
 }
 
@@ -698,25 +715,107 @@ double JointBlocks::aim_motors(Block& block) {
     block.tree.aim(way, error);
     worst = std::max(worst, std::abs(error));
   }
+  aim_stops(block, worst);
   return worst;
 }
 
-// After a solution: moves motors in the wrong set to the other one, or only one of them. Returns
-// whether any was moved.
-bool JointBlocks::choose_spent(Block& block, bool one) {
+// Stops that hold get the error of their rate; of others the impulse ends, which the motor beside
+// them has taken over if there is one.
+void JointBlocks::aim_stops(Block& block, double& worst) const {
+  for (const Stop& stop : block.stops) {
+    const Row& row = rows_[stop.row];
+    if (stop.holds) {
+      const double missing = stop.sign * row.target - block.tree.rate(stop.way);
+      block.tree.aim(stop.way, missing);
+      worst = std::max(worst, std::abs(missing));
+    } else if (stop.motor == JointTree::kNone) {
+      block.tree.push(stop.way, -stop.sign * row.impulse);
+      worst = std::max(worst, std::abs(row.impulse) * row.response);
+    }
+  }
+}
+
+// After a solution, of a stop that holds: what its motor gives at that rate, and the stop the rest.
+// A motor that moves against the stop gives its maximum, but one without any only what is needed.
+JointBlocks::Shares JointBlocks::shares_of(const Block& block, const Stop& stop) const {
+  constexpr double kNoMaximum = 0.9e9;  // N m or N
+  constexpr double kSame = 1e-9;        // rad/s, m/s
+  const Row& row = rows_[stop.row];
+  const double rate = stop.sign * row.target;
+  double whole = stop.sign * row.impulse + block.tree.impulse(stop.way);
+  Shares shares;
+  if (stop.motor != JointTree::kNone) {
+    const Row& motor = rows_[stop.motor];
+    whole += motor.impulse;
+    if (const Row* damper = damper_of(stop.motor)) {
+      shares.damper = -rate / damper->softness;
+      whole += damper->impulse - shares.damper;
+    }
+    double low = motor.lower, high = motor.upper;
+    if (motor.softness > 0.0)
+      low = high = std::clamp((motor.target - rate) / motor.softness, low, high);
+    else if (rate < motor.target - kSame)
+      low = high * closing_per_s_ < kNoMaximum ? high : 0.0;
+    else if (rate > motor.target + kSame)
+      high = low * closing_per_s_ > -kNoMaximum ? low : 0.0;
+    shares.motor = std::clamp(whole, low, high);
+    whole -= shares.motor;
+  }
+  shares.stop = stop.sign * whole;
+  return shares;
+}
+
+// After a solution: releases stops that pull, and lets those hold that a joint passes, at most so
+// many of them. Returns how many there were.
+size_t JointBlocks::choose_stops(Block& block, size_t most) {
+  constexpr double kSame = 1e-9;  // rad/s, m/s
+  size_t wrong = 0;
+  for (Stop& stop : block.stops) {
+    const Row& row = rows_[stop.row];
+    const double way_out = row.upper == 0.0 ? -1.0 : 1.0;  // of the row
+    if (stop.holds) {
+      if (way_out * shares_of(block, stop).stop >= 0.0 || ++wrong > most) continue;
+      if (stop.motor != JointTree::kNone) block.free.push_back(stop.motor);
+    } else {
+      const double rate = stop.sign * block.tree.rate_after(stop.way);
+      if (way_out * (rate - row.target) >= -kSame || ++wrong > most) continue;
+      std::erase(block.free, stop.motor);
+      std::erase_if(block.spent, [&](const Spent& spent) { return spent.row == stop.motor; });
+    }
+    stop.holds = !stop.holds;
+  }
+  return wrong;
+}
+
+// The impulses of stops, and of what is beside those that hold.
+void JointBlocks::give_shares(Block& block) {
+  for (const Stop& stop : block.stops) {
+    if (!stop.holds) {
+      rows_[stop.row].impulse = 0.0;
+      continue;
+    }
+    const Shares shares = shares_of(block, stop);
+    rows_[stop.row].impulse = shares.stop;
+    if (stop.motor == JointTree::kNone) continue;
+    rows_[stop.motor].impulse = shares.motor;
+    if (damper_of(stop.motor)) rows_[damper_of_row_[stop.motor]].impulse = shares.damper;
+  }
+}
+
+// After a solution: moves motors in the wrong set to the other one, at most so many of them.
+// Returns how many were in the wrong one.
+size_t JointBlocks::choose_spent(Block& block, size_t most) {
   constexpr double kSame = 1e-9;  // rad/s, m/s
   const size_t were_spent = block.spent.size();
-  bool any = false;
-  size_t kept = 0;
+  size_t wrong = 0, kept = 0;
   for (size_t i = 0; i < block.free.size(); ++i) {
     const size_t r = block.free[i];
     const double wanted = rows_[r].impulse + x_[i] - damper_gives(block, r);
     const bool holds = wanted >= rows_[r].lower && wanted <= rows_[r].upper;
-    if (holds || (one && any)) {
+    if (holds || ++wrong > most) {
       block.free[kept++] = r;
     } else {
       block.spent.push_back({r, wanted > rows_[r].upper});
-      any = true;
     }
   }
   block.free.resize(kept);
@@ -727,27 +826,41 @@ bool JointBlocks::choose_spent(Block& block, bool one) {
     const double error =
         row.target - block.tree.rate_after(way_of_row_[spent.row]) - row.softness * bound_of(spent);
     const bool too_much = spent.upper ? error < -kSame : error > kSame;
-    if (i >= were_spent || !too_much || (one && any)) {
+    if (i >= were_spent || !too_much || ++wrong > most) {
       block.spent[kept++] = spent;
     } else {
       block.free.push_back(spent.row);
-      any = true;
     }
   }
   block.spent.resize(kept);
-  return any;
+  return wrong;
 }
 
 double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
-  constexpr int kAllAtOnce = 6, kMost = 60;  // exchanges of all at once; then one by one
+  // Exchanges of all at once that make it no better; then one by one until one does (J. Judice, F.
+  // Pires, "A block principal pivoting algorithm for large-scale strictly monotone linear
+  // complementarity problems", 1994).
+  constexpr int kAllAtOnce = 6, kMost = 60;
+  size_t least = SIZE_MAX;
+  int left = kAllAtOnce;
+  const int most = kMost + static_cast<int>(block.stops.size());
+  for (const Stop& stop : block.stops) {  // they share anew
+    if (stop.motor == JointTree::kNone) continue;
+    rows_[stop.motor].impulse += stop.sign * std::exchange(rows_[stop.row].impulse, 0.0);
+  }
   double worst =
       block.tree.aim([&](int body) { return std::pair(bodies[body].v, bodies[body].w); }, 0.0);
-  for (int i = 0; i < kMost; ++i) {
+  for (int i = 0; i < most; ++i) {
     if (!block.factored) factor(block);
     worst = std::max(worst, aim_motors(block));
     solve(block, x_);
-    block.exact = !choose_spent(block, i >= kAllAtOnce);
+    const size_t at_once = left > 0 ? SIZE_MAX : 1;
+    const size_t motors = choose_spent(block, at_once);
+    const size_t wrong = motors + choose_stops(block, left > 0 ? SIZE_MAX : motors > 0 ? 0 : 1);
+    block.exact = wrong == 0;
     if (block.exact) break;
+    left = wrong < least ? kAllAtOnce : std::max(left - 1, 0);
+    least = std::min(least, wrong);
     block.factored = false;
   }
   if (!block.factored) {
@@ -756,6 +869,7 @@ double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
     solve(block, x_);
     block.exact = false;
   }
+  give_shares(block);
   const auto damp = [&](size_t motor) {
     const double more = damper_gives(block, motor);
     if (damper_of(motor)) rows_[damper_of_row_[motor]].impulse += more;
@@ -784,15 +898,28 @@ void JointBlocks::hold_push(Block& block) const {
     else
       block.tree.push(way, 0.0);
   }
+  for (const Stop& stop : block.stops) {
+    if (stop.holds)
+      block.tree.aim(stop.way, -block.tree.rate(stop.way));
+    else if (stop.motor == JointTree::kNone)
+      block.tree.push(stop.way, 0.0);
+  }
 }
 
-double JointBlocks::aim_push(Block& block, const SolverBodies& bodies) {
+double JointBlocks::aim_push(Block& block, const SolverBodies& bodies, bool stops) {
   double worst = 0.0;
   if (block.is_tree) {
     worst = block.tree.aim(
         [&](int body) { return std::pair(bodies[body].push_v, bodies[body].push_w); },
         closing_per_s_);
     hold_push(block);
+    for (const Stop& stop : block.stops) {
+      if (!stop.holds) continue;
+      const double missing =
+          (stops ? stop.sign * rows_[stop.row].push_target : 0.0) - block.tree.rate(stop.way);
+      block.tree.aim(stop.way, missing);
+      worst = std::max(worst, std::abs(missing));
+    }
   }
   x_.resize(block.free.size());
   for (size_t i = 0; i < x_.size(); ++i) {
@@ -956,12 +1083,12 @@ double JointBlocks::look_again(double substep_s) {
   return largest;
 }
 
-double JointBlocks::sweep_push(SolverBodies& bodies) {
+double JointBlocks::sweep_push(SolverBodies& bodies, bool stops) {
   double worst = 0.0;
   for (size_t b = 0; b < block_count_; ++b) {
     Block& block = blocks_[b];
     if (!block.factored) factor(block);
-    worst = std::max(worst, aim_push(block, bodies));
+    worst = std::max(worst, aim_push(block, bodies, stops));
     solve(block, x_);
     if (block.is_tree) {
       block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
@@ -974,9 +1101,9 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
     for (const size_t i : block.bounded) {
       Row& row = rows_[i];
       if (!is_stop(row)) continue;  // a motor at its limit holds nothing
-      const double wanted =
-          std::clamp(row.push + (row.push_target - row.push_velocity(bodies)) * row.inverse,
-                     row.lower, row.upper);
+      const double wanted = std::clamp(
+          row.push + ((stops ? row.push_target : 0.0) - row.push_velocity(bodies)) * row.inverse,
+          row.lower, row.upper);
       worst = std::max(worst, std::abs(wanted - row.push) * row.response);
       row.give_push(bodies, wanted - row.push);
     }

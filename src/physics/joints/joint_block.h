@@ -36,7 +36,8 @@ class JointBlocks {
   // Brings all rows to their targets as far as their bounds allow. Returns the largest error
   // before, m/s or rad/s.
   double sweep(SolverBodies& bodies);
-  double sweep_push(SolverBodies& bodies);
+  // The same for positions; stops: also those of joints beyond their stops.
+  double sweep_push(SolverBodies& bodies, bool stops);
   // To be called after the bodies have moved. Sets the rows' push targets to the velocities that
   // correct the joints' errors within a substep; returns the largest.
   double look_again(double substep_s);
@@ -71,6 +72,14 @@ class JointBlocks {
     size_t row = 0;
     bool upper = false;
   };
+  // Of a joint of a tree that is at its stop. A stop that holds prescribes the rate, and takes what
+  // the motor beside it cannot.
+  struct Stop {
+    size_t row = 0, way = 0;
+    size_t motor = JointTree::kNone;  // row; only while the stop does not hold among free and spent
+    double sign = 1.0;                // of its row, relative to the way
+    bool holds = true;
+  };
   struct Block {
     std::vector<size_t> joints;
     size_t bodies = 0, hung = 0;  // movable ones; joints to immovable ones
@@ -79,6 +88,7 @@ class JointBlocks {
     std::vector<size_t> free;     // rows that are solved directly: none is at a bound
     std::vector<size_t> bounded;  // rows at a bound, relaxed iteratively
     std::vector<Spent> spent;     // in a tree: motors at a bound
+    std::vector<Stop> stops;      // in a tree
     // L D L^T of the free rows: D L^T, upper, by rows; 1 / D; and for each row the first column
     // below the diagonal that is not 0, and the last one above it.
     std::vector<double> factor, inverse;
@@ -136,10 +146,17 @@ class JointBlocks {
   double bound_of(const Spent& spent) const {
     return spent.upper ? rows_[spent.row].upper : rows_[spent.row].lower;
   }
+  struct Shares {
+    double stop = 0.0, motor = 0.0, damper = 0.0;  // impulses
+  };
+  Shares shares_of(const Block& block, const Stop& stop) const;
+  void aim_stops(Block& block, double& worst) const;
+  size_t choose_stops(Block& block, size_t most);
+  void give_shares(Block& block);
   void hold_push(Block& block) const;
-  bool choose_spent(Block& block, bool one);
+  size_t choose_spent(Block& block, size_t most);
   double aim(Block& block, const SolverBodies& bodies);
-  double aim_push(Block& block, const SolverBodies& bodies);
+  double aim_push(Block& block, const SolverBodies& bodies, bool stops);
   void find_envelope(Block& block);
   void write_matrix(Block& block);
   void factor(Block& block);
