@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <string>
 #include <string_view>
@@ -21,10 +22,12 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "base/warnings.h"
 #include "base/option_text.h"
 #include "base/utf8.h"
 #include "base/version.h"
@@ -57,11 +60,22 @@ class LoggedText : public spdlog::custom_flag_formatter {
   }
 };
 
+class KeptWarnings : public spdlog::sinks::base_sink<std::mutex> {
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    ruedo::keep_warning(message.level == spdlog::level::warn ? "warning" : "error",
+                        {message.payload.data(), message.payload.size()});
+  }
+  void flush_() override {}
+};
+
 void set_up_logging() {
   spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
   formatter->add_flag<LoggedText>('*').set_pattern("%^ruedo: %l:%$ %*");
   spdlog::set_formatter(std::move(formatter));
+  auto kept = std::make_shared<KeptWarnings>();
+  kept->set_level(spdlog::level::warn);
+  spdlog::default_logger()->sinks().push_back(std::move(kept));
 }
 
 void say(const std::string& text) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "base/warnings.h"
 #include "base/json.h"
 
 namespace ruedo::console {
@@ -169,7 +170,7 @@ bool Viewer::next_text(std::string& text) {
     text = json.text();
     return true;
   }
-  return next_events(text);
+  return next_events(text) || next_warnings(text);
 }
 
 // A running time is sent now and then, everything else at once.
@@ -198,6 +199,19 @@ bool Viewer::next_playback(std::string& text) {
       .close('}')
       .close('}');
   text = json.text();
+  return true;
+}
+
+// {"first": 0, "warnings": [{"kind": ..., "text": ...}, ...]}: starting at that index.
+bool Viewer::next_warnings(std::string& text) {
+  const std::vector<Warning> fresh = warnings_from(told_warnings_);
+  if (fresh.empty()) return false;
+  JsonWriter json;
+  json.open('{').member("first", static_cast<int64_t>(told_warnings_)).name("warnings").open('[');
+  for (const auto& [kind, words] : fresh)
+    json.open('{').member("kind", kind).member("text", printable(words)).close('}');
+  text = json.close(']').close('}').text();
+  told_warnings_ += fresh.size();
   return true;
 }
 

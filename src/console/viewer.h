@@ -66,6 +66,7 @@ class Viewer : public http::Connection {
   bool next_messages(std::vector<uint8_t>& frame);
   bool next_playback(std::string& text);
   bool next_events(std::string& text);
+  bool next_warnings(std::string& text);
   void add_traffic(std::vector<uint8_t>& frame);
   Board& board() { return look_ ? own_board_ : stage_.board; }
 
@@ -84,6 +85,7 @@ class Viewer : public http::Connection {
   std::chrono::steady_clock::time_point told_playback_at_;
   size_t told_events_ = 0;                 // in the list
   uint64_t told_generation_ = UINT64_MAX;  // generation of that list
+  size_t told_warnings_ = 0;               // of the program
   bool compared_ = false;                  // the differences have been sent
   bool greeted_ = false, parted_ = false, traffic_ = false;
   std::string note_;  // to be sent next

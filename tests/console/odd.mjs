@@ -51,7 +51,44 @@ export default async function odd({ page, until, check, ready, server, expect, p
   await until("or places something", () =>
     window.ruedo.page.now.scene.models.some(({ name }) => name === "box"),
   );
+  await page.getByRole("tab", { name: "World" }).click();
+  await page.locator('[data-tool="room"]').click();
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("Enter");
+  const begun = await page.locator(".cross").boundingBox();
+  for (let i = 0; i < 5; ++i) await page.keyboard.press("ArrowRight");
+  for (let i = 0; i < 4; ++i) await page.keyboard.press("ArrowUp");
+  await until("what is drawn by keys is seen", () =>
+    /^\d+\.\d\d × \d+\.\d\d m$/.test(document.getElementById("drawing").textContent),
+  );
+  await picture("drawn");
+  const ended = await page.locator(".cross").boundingBox();
+  await page.keyboard.press("Enter");
+  await until(
+    "a room is drawn by keys between two points",
+    ([a, b]) => {
+      const { stage, page } = window.ruedo,
+        room = page.now.scene.models.find(({ name }) => name === "room");
+      if (!room) return false;
+      const [from, to] = [a, b].map(({ x, y }) => stage.picker.level(x + 12.5, y + 12.5, 0));
+      return (
+        Math.abs(room.pose[0] - (from.x + to.x) / 2) < 0.11 &&
+        Math.abs(room.pose[1] - (from.y + to.y) / 2) < 0.11
+      );
+    },
+    [begun, ended],
+  );
+  await page.keyboard.press("Escape");
   check("(the run stands)", (await server()).paused);
+
+  // ---- what the program warns of
+  await page.getByRole("tab", { name: "Notes" }).click();
+  check(
+    "the page has the program's warnings",
+    /unsupported.*world\.sdf:\d+.*audio/.test(await page.locator("#warnings").innerText()),
+    await page.locator("#warnings").innerText(),
+  );
 
   // ---- the graphics
   expect(/Context (Lost|Restored)/); // three says so, too

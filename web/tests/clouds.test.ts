@@ -1,7 +1,9 @@
 // Points of 3-D range finders and depth cameras, by hand; and frames in words.
+import * as THREE from "three";
 import { describe, expect, it } from "vitest";
 import { image_t, type lidar_t } from "../generated/messages";
 import { pointsOfDepth, pointsOfLidar } from "../src/scene/clouds";
+import { PastPoints } from "../src/scene/past_points";
 import { poseWords } from "../src/ui/frames";
 
 const near = (found: Float32Array | null, wanted: number[]) => {
@@ -57,5 +59,33 @@ describe("clouds", () => {
       "1.000 m, 0.000 m, 0.200 m, yaw 90.0°",
     );
     expect(poseWords([0, 0, 0], [half, half, 0, 0])).toBe("0.000 m, 0.000 m, 0.000 m, roll 90.0°");
+  });
+});
+
+describe("points that stay", () => {
+  const seen = (x: number) => ({
+    points: new Float32Array([x, 0, 0]),
+    colours: new Float32Array([1, 1, 0]),
+  });
+  const at = (past: PastPoints) => [
+    ...(past.object.geometry.getAttribute("position").array as Float32Array),
+  ];
+  it("are where they were in the world, for that long", () => {
+    const past = new PastPoints(),
+      robot = new THREE.Matrix4();
+    past.add(1, 2, seen(1), robot);
+    past.add(2, 2, seen(1), robot.makeTranslation(5, 0, 0));
+    expect(at(past)).toEqual([1, 0, 0, 6, 0, 0]);
+    past.add(3.5, 2, seen(1), robot.makeTranslation(7, 0, 0));
+    expect(at(past)).toEqual([6, 0, 0, 8, 0, 0]);
+    past.add(3.6, 0, seen(1), robot);
+    expect(at(past)).toEqual([]);
+  });
+  it("are those before the shown moment alone", () => {
+    const past = new PastPoints();
+    past.add(1, 9, seen(1), new THREE.Matrix4());
+    past.add(5, 9, seen(2), new THREE.Matrix4());
+    past.add(3, 9, seen(3), new THREE.Matrix4());
+    expect(at(past)).toEqual([1, 0, 0, 3, 0, 0]);
   });
 });

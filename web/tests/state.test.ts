@@ -1,5 +1,5 @@
 // The store, the clock, which channels are wanted, and the text about the run.
-import { displayOf } from "../src/state/display";
+import { displayFor, displaysOf } from "../src/state/display";
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Clock, clockText } from "../src/state/clock";
 import { shownRobots, stateWords, type PageState } from "../src/state/page";
@@ -60,10 +60,11 @@ function state(more: Partial<PageState> = {}): PageState {
     past: null,
     kept: { begin: 0, end: 0 },
     span: null,
-    display: displayOf(null),
+    displays: displaysOf(null),
     comparison: null,
     events: [],
     eventKind: "",
+    warnings: [],
     loop: false,
     marks: { begin: null, end: null },
     layers: new Set(),
@@ -233,4 +234,24 @@ it("what is said of the run", () => {
     "log, paused",
     null,
   ]);
+});
+
+describe("how what robots sense is drawn", () => {
+  const usual = displayFor(new Map(), "a");
+  it("is that of the robot, else that of all, else the usual", () => {
+    const displays = displaysOf(
+      JSON.stringify([
+        ["", { ...usual, size: 2 }],
+        ["a", { ...usual, decay_s: 5 }],
+      ]),
+    );
+    expect(displayFor(displays, "a").decay_s).toBe(5);
+    expect(displayFor(displays, "b")).toEqual({ ...usual, size: 2 });
+    expect(displayFor(new Map(), "b")).toEqual(usual);
+  });
+  it("takes nothing that is out of its limits", () => {
+    for (const wrong of [{ cover: 2 }, { decay_s: -1 }, { size: null }, { colouring: "x" }])
+      expect(displaysOf(JSON.stringify([["a", { ...usual, ...wrong }]])).size).toBe(0);
+    expect(displaysOf("{").size).toBe(0);
+  });
 });

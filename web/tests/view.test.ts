@@ -1,6 +1,6 @@
 // The view of the scene: camera, level of detail, and lights.
 import * as THREE from "three";
-import { displayOf } from "../src/state/display";
+import { displayFor } from "../src/state/display";
 import { describe, expect, it } from "vitest";
 import { Crowd } from "../src/scene/crowd";
 import type { Movers } from "../src/scene/build";
@@ -91,7 +91,7 @@ describe("rays and cones", () => {
       return found;
     };
     const alone = opacities();
-    overlay.style(displayOf(null), 4);
+    overlay.style(displayFor(new Map(), ""), 4);
     expect(alone.length).toBe(2);
     expect(opacities()).toEqual(alone.map((opacity) => opacity / 4));
   });

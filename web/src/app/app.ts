@@ -124,8 +124,9 @@ export class App {
       (point, further) => robot.trip.go(point, further),
     );
     new Aim(byId("view"), scene.canvas, model.page, {
-      click,
-      look: (x, y) => scene.measure.look(x, y),
+      click: (x, y, further) =>
+        editing.draw.drawing ? editing.draw.click(x, y) : click(x, y, further),
+      look: (x, y) => (editing.draw.drawing ? editing.draw.look(x, y) : scene.measure.look(x, y)),
     });
     model.onForget((reset) => {
       if (reset) this.fallen.forget();

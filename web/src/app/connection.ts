@@ -57,6 +57,10 @@ export class Connection implements LinkHandler {
     const { page } = this.model;
     page.set({ events: [...page.now.events.slice(0, first), ...events] });
   }
+  warnings(...[first, warnings]: Parameters<LinkHandler["warnings"]>): void {
+    const { page } = this.model;
+    page.set({ warnings: [...page.now.warnings.slice(0, first), ...warnings] });
+  }
   comparison(...[comparison]: Parameters<LinkHandler["comparison"]>): void {
     this.model.page.set({ comparison });
   }

@@ -48,6 +48,8 @@ export function routesOf(world: World): Map<string, Route> {
 // What shows the pictures of single channels.
 type Cameras = readonly { message(channel: string, image: Messages["image_t"]): void }[];
 
+const seconds = ({ utime }: { utime: bigint }) => Number(utime) * 1e-6;
+
 // The source of a robot's message, and the views that show it.
 interface Shown {
   channel: string;
@@ -103,14 +105,14 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
     const image = read();
     const points =
       device && isDepth(channel, "image_t") ? pointsOfDepth(image, device.fov_horizontal) : null;
-    if (points) overlay?.cloud(device!, points, null);
+    if (points) overlay?.cloud(device!, seconds(image), points, null);
     for (const each of cameras) each.message(channel, image);
     pages?.camera(channel.slice(channel.indexOf("/") + 1), image, device?.kind);
   },
   lidar_t({ device, overlay }, read) {
     if (!device) return;
     const scan = read();
-    overlay?.cloud(device, pointsOfLidar(scan), intensitiesOf(scan));
+    overlay?.cloud(device, seconds(scan), pointsOfLidar(scan), intensitiesOf(scan));
   },
   joint_state_t: ({ pages }, read) => pages?.joints(read()),
 };

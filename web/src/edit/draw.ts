@@ -1,4 +1,5 @@
-// Drawing walls and rooms by dragging, on the floor where the drag begins.
+// Drawing walls and rooms by dragging, or by one click where they begin and one where they end (as
+// keys click), on the floor where they begin.
 import * as THREE from "three";
 import { kOnTop, putOnTop } from "../scene/on_top";
 import type { Stage } from "../scene/stage";
@@ -7,6 +8,7 @@ import type { Editor } from "./editor";
 import { roomModel, wallModel, type WallStyle } from "./sdf";
 
 const kShortest_m = 0.2;
+type Place = Pick<PointerEvent, "clientX" | "clientY">; // of the page
 type Point = { x: number; y: number; z: number };
 
 export class Draw {
@@ -46,6 +48,18 @@ export class Draw {
     return this.page.now.tool === "wall" || this.page.now.tool === "room";
   }
 
+  // Begins at a point of the page, or ends there.
+  click(x: number, y: number): void {
+    if (this.from) {
+      this.drag({ clientX: x, clientY: y });
+      void this.finish();
+    } else this.beginAt({ clientX: x, clientY: y });
+  }
+  // What would be drawn to that point of the page.
+  look(x: number, y: number): void {
+    if (this.from) this.drag({ clientX: x, clientY: y });
+  }
+
   cancel(): void {
     this.from = null;
     this.ghost.visible = false;
@@ -54,7 +68,7 @@ export class Draw {
   }
 
   // A point at the height where the drag began; at its begin, one that is seen.
-  private point({ clientX, clientY }: PointerEvent): Point | null {
+  private point({ clientX, clientY }: Place): Point | null {
     const { picker } = this.stage,
       point = this.from
         ? picker.level(clientX, clientY, this.from.z)
@@ -66,13 +80,17 @@ export class Draw {
   }
 
   private begin(canvas: HTMLCanvasElement, event: PointerEvent): void {
-    this.from = this.point(event);
-    if (this.from) this.to = this.from;
+    this.beginAt(event);
     canvas.setPointerCapture(event.pointerId);
   }
 
-  private drag(event: PointerEvent): void {
-    const point = this.point(event);
+  private beginAt(place: Place): void {
+    this.from = this.point(place);
+    if (this.from) this.to = this.from;
+  }
+
+  private drag(place: Place): void {
+    const point = this.point(place);
     if (!point || !this.from) return;
     this.to = point;
     const { from, to } = this,

@@ -70,7 +70,7 @@ export class Cloud {
       fog: false,
     }),
   );
-  private readonly mount = new THREE.Matrix4();
+  readonly mount = new THREE.Matrix4();
   private points = new Float32Array();
   private intensities: Float32Array | null = null;
   private colouring: Display["colouring"] = "range";
@@ -90,8 +90,14 @@ export class Cloud {
     this.paint();
   }
 
-  style({ size, colouring }: Display): void {
-    this.object.material.size = kSize_px * size;
+  get seen(): { points: Float32Array; colours: Float32Array } {
+    const colours = this.object.geometry.getAttribute("color") as THREE.BufferAttribute;
+    return { points: this.points, colours: colours.array as Float32Array };
+  }
+
+  style({ size, cover, colouring }: Display): void {
+    const { material } = this.object;
+    Object.assign(material, { size: kSize_px * size, opacity: cover, transparent: cover < 1 });
     this.colouring = colouring;
     this.paint();
   }

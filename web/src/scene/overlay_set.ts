@@ -1,5 +1,6 @@
 // The overlays of the robots whose sensors are drawn, and the ring around the chosen one.
 import * as THREE from "three";
+import { displayFor } from "../state/display";
 import { shownRobots, type Page } from "../state/page";
 import { RobotOverlay } from "./overlays";
 import type { Stage } from "./stage";
@@ -27,7 +28,7 @@ export class OverlaySet {
     stage.scene.add(this.marker);
     page.watch(["world", "scene", "robot"], () => this.make());
     page.watch(["layers"], () => stage.touch());
-    page.watch(["display"], () => {
+    page.watch(["displays"], () => {
       this.style();
       stage.touch();
     });
@@ -63,7 +64,8 @@ export class OverlaySet {
   }
 
   private style(): void {
-    for (const overlay of this.of.values()) overlay.style(this.page.now.display, this.of.size);
+    for (const [name, overlay] of this.of)
+      overlay.style(displayFor(this.page.now.displays, name), this.of.size);
   }
 
   // Moves them with the robots; true if there is something to draw.

@@ -9,11 +9,12 @@ import type {
   pose_t,
   sonar_t,
 } from "../../generated/messages";
-import { displayOf, type Display } from "../state/display";
+import { displayFor, type Display } from "../state/display";
 import type { Layer } from "../state/layers";
 import { Cloud } from "./clouds";
 import { matrixOf } from "./matrix";
 import { kOnTop, putOnTop } from "./on_top";
+import { PastPoints } from "./past_points";
 
 const kColours = {
   rays: 0xff5a4d,
@@ -73,7 +74,9 @@ const glow = (colour: number, opacity: number) =>
 const kFan = 0.1,
   kRays = 0.35,
   kCones = 0.16;
-const kPoint_px = 4;
+const kPoint_px = 4,
+  kPast_px = 2.5;
+const kInto = new THREE.Matrix4();
 
 class ScanView {
   readonly group = new THREE.Group();
@@ -104,7 +107,8 @@ class ScanView {
       }),
     ),
   );
-  private readonly mount = new THREE.Matrix4();
+  readonly mount = new THREE.Matrix4();
+  private hits = 0;
 
   constructor(private readonly device: device_info_t) {
     devicePose(device, this.mount);
@@ -112,10 +116,19 @@ class ScanView {
     this.group.matrixAutoUpdate = false;
   }
 
-  style({ size }: Display, strength: number): void {
+  // What it saw last, in its own frame.
+  get seen(): { points: Float32Array; colours: Float32Array } {
+    const all = this.points.object.geometry.getAttribute("position") as THREE.BufferAttribute,
+      points = (all.array as Float32Array).subarray(0, 3 * this.hits),
+      colour = new THREE.Color(kColours.points).toArray();
+    return { points, colours: points.map((_, i) => colour[i % 3]!) };
+  }
+
+  style({ size, cover }: Display, strength: number): void {
     this.fan.object.material.opacity = Math.min(1, kFan * strength);
     this.lines.object.material.opacity = Math.min(1, kRays * strength);
-    this.points.object.material.size = kPoint_px * size;
+    const { material } = this.points.object;
+    Object.assign(material, { size: kPoint_px * size, opacity: cover, transparent: cover < 1 });
   }
 
   show(scan: planar_lidar_t): void {
@@ -139,6 +152,7 @@ class ScanView {
       }
     });
     this.points.object.geometry.setDrawRange(0, hits);
+    this.hits = hits;
     const every = Math.max(1, Math.round(n / 180));
     const shown = Math.ceil(n / every);
     this.lines.write(2 * shown, (p) => {
@@ -286,6 +300,8 @@ export class RobotOverlay {
   private readonly scans = new Map<string, ScanView>();
   private readonly sonars = new Map<string, SonarView>();
   readonly clouds = new Map<string, Cloud>();
+  private readonly past = new Map<string, PastPoints>(); // of each device
+  private readonly base = new THREE.Matrix4();
   private readonly truth = new Trail(kColours.trail);
   private readonly odometry = new Trail(kColours.odometry);
   private readonly contacts = new Strip(
@@ -305,7 +321,7 @@ export class RobotOverlay {
   private readonly point = new THREE.Vector3();
   private changed = true;
   private strength = 1;
-  private display: Display = displayOf(null);
+  private display: Display = displayFor(new Map(), "");
 
   constructor(
     devices: device_info_t[],
@@ -334,14 +350,22 @@ export class RobotOverlay {
   }
 
   scan(device: device_info_t, message: planar_lidar_t): void {
-    this.view(this.scans, device, ScanView).show(message);
+    const view = this.view(this.scans, device, ScanView);
+    view.show(message);
+    this.stay(device.name, Number(message.utime) * 1e-6, view);
     this.changed = true;
   }
   sonar(device: device_info_t, message: sonar_t): void {
     this.view(this.sonars, device, SonarView).show(message);
     this.changed = true;
   }
-  cloud(device: device_info_t, points: Float32Array, intensities: Float32Array | null): void {
+  // time_s: of the message.
+  cloud(
+    device: device_info_t,
+    time_s: number,
+    points: Float32Array,
+    intensities: Float32Array | null,
+  ): void {
     let cloud = this.clouds.get(device.name);
     if (!cloud) {
       cloud = new Cloud(device);
@@ -350,7 +374,26 @@ export class RobotOverlay {
       this.group.add(cloud.object);
     }
     cloud.show(points, intensities);
+    this.stay(device.name, time_s, cloud);
     this.changed = true;
+  }
+  // What a device saw stays where it was in the world.
+  private stay(
+    device: string,
+    time_s: number,
+    { seen, mount }: Pick<ScanView, "seen" | "mount">,
+  ): void {
+    const { decay_s, size, cover } = this.display;
+    let past = this.past.get(device);
+    if (!past) {
+      if (decay_s === 0) return;
+      past = new PastPoints();
+      this.past.set(device, past);
+      this.group.add(past.object);
+    }
+    const { material } = past.object;
+    Object.assign(material, { size: kPast_px * size, opacity: cover, transparent: cover < 1 });
+    past.add(time_s, decay_s, seen, kInto.multiplyMatrices(this.base, mount));
   }
   pose(message: pose_t): void {
     this.truth.add(message.pos[0]!, message.pos[1]!, message.pos[2]! + kTruthAbove_m);
@@ -401,6 +444,7 @@ export class RobotOverlay {
     this.truth.clear();
     this.odometry.clear();
     this.contacts.write(0, () => undefined);
+    for (const past of this.past.values()) past.clear();
     this.changed = true;
   }
 
@@ -408,6 +452,9 @@ export class RobotOverlay {
     for (const view of [...this.scans.values(), ...this.sonars.values()]) view.place(base, layers);
     for (const cloud of this.clouds.values()) cloud.place(base, layers.has("clouds"));
     this.baseFrame.matrix.copy(base);
+    this.base.copy(base);
+    for (const [name, { object }] of this.past)
+      object.visible = layers.has(this.clouds.has(name) ? "clouds" : "points");
     this.truth.strip.object.visible = layers.has("trail");
     this.odometry.strip.object.visible = layers.has("odometry");
     this.contacts.object.visible = layers.has("contacts");

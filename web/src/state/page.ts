@@ -1,8 +1,8 @@
 // The page's state: what runs, what is shown of it, and how.
-import type { Hello, LinkState, Playback, RunEvent, Comparison } from "../wire/protocol";
+import type { Hello, LinkState, Playback, RunEvent, Comparison, Warning } from "../wire/protocol";
 import type { Past } from "../wire/rewind";
 import type { Description } from "../wire/description";
-import { recallDisplay, type Display } from "./display";
+import { recallDisplays, type Displays } from "./display";
 import { kLayers, kOffAtFirst, type Layer } from "./layers";
 import { recall } from "./memory";
 import { Store } from "./store";
@@ -50,13 +50,14 @@ export interface PageState {
   kept: { begin: number; end: number }; // what can be shown of the past
   comparison: Comparison | null; // with the other log; null if there is none, or not yet
   events: readonly RunEvent[]; // in order of time
+  warnings: readonly Warning[]; // of the program
   eventKind: string; // which of them are shown; "" for all
   loop: boolean; // playback starts over at the end
   // of the part that is looped; null: from the beginning, to the end
   marks: { begin: number | null; end: number | null };
   span: Span | null; // the part of the time line that is shown; null: all of it
   layers: ReadonlySet<Layer>;
-  display: Display; // of what robots sense
+  displays: Displays; // of what robots sense
   mode: ViewMode;
   drawn: boolean; // clients have drawn something
   reduced: boolean; // drawn with fewer pixels than the display has
@@ -98,12 +99,13 @@ export function makePage(): Page {
     kept: { begin: 0, end: 0 },
     comparison: null,
     events: [],
+    warnings: [],
     eventKind: "",
     loop: false,
     marks: { begin: null, end: null },
     span: null,
     layers: new Set(kLayers.filter((layer) => !off.includes(layer))),
-    display: recallDisplay(),
+    displays: recallDisplays(),
     mode: "orbit",
     drawn: false,
     reduced: false,

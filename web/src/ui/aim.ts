@@ -63,4 +63,4 @@ export class Aim {
 }
 
 const waitsForClick = (tool: Tool) =>
-  typeof tool !== "string" || tool === "go" || tool === "measure" || tool === "door";
+  typeof tool !== "string" || tool === "go" || ["measure", "door", "wall", "room"].includes(tool);

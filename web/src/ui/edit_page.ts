@@ -5,8 +5,8 @@ import type { Page, Tool } from "../state/page";
 import type { Stage } from "../scene/stage";
 import { h, say } from "../widgets/elements";
 import { numberField } from "../widgets/number_field";
-import { kColourings, kLeast, kMost, rememberDisplay, type Display } from "../state/display";
 import { recall, remember } from "../state/memory";
+import { makeDisplayForm } from "./display_form";
 import { Library } from "./library";
 import { kThings } from "../edit/things";
 import { Transform } from "./transform";
@@ -179,44 +179,6 @@ export class EditPage {
     );
   }
 
-  // How what robots sense is drawn.
-  private display(): HTMLElement {
-    const { page } = this,
-      change = (by: Partial<Display>) => {
-        const display = { ...page.now.display, ...by };
-        rememberDisplay(display);
-        page.set({ display });
-      };
-    const slider = (label: string, key: "size" | "opacity") => {
-      const field = h("input", {
-        type: "range",
-        min: Math.log2(kLeast),
-        max: Math.log2(kMost),
-        step: 0.25,
-        value: Math.log2(page.now.display[key]),
-        "aria-label": label,
-      });
-      field.addEventListener("input", () => change({ [key]: 2 ** Number(field.value) }));
-      return h("label", { class: "row" }, h("span", { class: "dim" }, label), field);
-    };
-    const colouring = h(
-      "select",
-      { "aria-label": "colour of clouds" },
-      ...kColourings.map((each) => h("option", {}, each)),
-    );
-    colouring.value = page.now.display.colouring;
-    colouring.addEventListener("change", () =>
-      change({ colouring: colouring.value as Display["colouring"] }),
-    );
-    return h(
-      "div",
-      {},
-      slider("size of points", "size"),
-      slider("strength of rays", "opacity"),
-      h("label", { class: "row" }, h("span", { class: "dim" }, "clouds coloured by"), colouring),
-    );
-  }
-
   private view(): HTMLElement {
     const { stage } = this,
       shadows = h("input", { type: "checkbox", checked: true });
@@ -246,7 +208,7 @@ export class EditPage {
       h("label", { class: "check" }, edges, "wireframe"),
       h("label", { class: "check" }, shadows, "shadows"),
       h("label", { class: "check" }, less, "less detail where drawing is slow"),
-      this.display(),
+      makeDisplayForm(page),
       h(
         "div",
         { class: "row" },

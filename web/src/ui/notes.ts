@@ -1,6 +1,7 @@
-// What the page has said: each note with its times, the newest first, as toasts disappear.
+// What the program has warned of, and what the page has said: each note with its times, the newest
+// first, as toasts disappear.
 import { clockText } from "../state/clock";
-import type { Page } from "../state/page";
+import type { Page, PageState } from "../state/page";
 import { h, onToast } from "../widgets/elements";
 
 const kMost = 500;
@@ -8,11 +9,22 @@ const kMost = 500;
 export class Notes {
   readonly element: HTMLElement;
   private readonly list = h("ol", { class: "notes", id: "notes" });
+  private readonly warnings = h("ol", { class: "notes", id: "warnings" });
   private readonly none = h("p", { class: "dim" }, "Nothing was said so far.");
 
   constructor(page: Page) {
     const clear = h("button", { id: "clear-notes", click: () => this.clear() }, "Clear");
-    this.element = h("section", {}, h("div", { class: "row" }, clear), this.none, this.list);
+    this.element = h(
+      "section",
+      {},
+      h("h2", {}, "The program"),
+      this.warnings,
+      h("h2", {}, "This page"),
+      h("div", { class: "row" }, clear),
+      this.none,
+      this.list,
+    );
+    page.watch(["warnings"], ({ warnings }) => this.showWarnings(warnings));
     onToast((text, kind) => {
       const { world, time_s } = page.now,
         sim = world ? clockText(time_s, world.step_us) : "",
@@ -23,6 +35,15 @@ export class Notes {
       if (this.list.childElementCount > kMost) this.list.lastElementChild!.remove();
       this.none.hidden = true;
     });
+  }
+
+  private showWarnings(warnings: PageState["warnings"]): void {
+    const lines = warnings.map(({ kind, text }) =>
+      h("li", { class: kind === "error" ? "error" : "" }, h("b", {}, kind), ` ${text}`),
+    );
+    this.warnings.replaceChildren(
+      ...(lines.length > 0 ? lines : [h("li", { class: "dim" }, "has warned of nothing.")]),
+    );
   }
 
   private clear(): void {

@@ -4,6 +4,7 @@ import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
 const kMostPixels = 1 << 24;
+const kMostLabels = 16; // in the legend
 const kCount_K = 0.01; // of a thermal camera, unless its file says otherwise
 
 // What the pixels of a raw picture are.
@@ -36,6 +37,7 @@ const words = (value: number, quantity: Quantity): string => {
 export class Picture {
   private readonly canvas: HTMLCanvasElement;
   private readonly caption = h("figcaption");
+  private readonly legend = h("div", { class: "xy-legend", hidden: true }); // of labels
   readonly element: HTMLElement;
   private next: Blob | null = null; // the newest JPEG, while another one is being decoded
   private reading = false;
@@ -55,7 +57,7 @@ export class Picture {
       "aria-label": `picture of ${name}`,
       hidden: true,
     });
-    this.element = h("figure", { "data-camera": name }, this.canvas, this.caption);
+    this.element = h("figure", { "data-camera": name }, this.canvas, this.caption, this.legend);
     say(this.caption, `${name}: no picture yet`);
     this.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
       this.pointer = [offsetX / this.canvas.clientWidth, offsetY / this.canvas.clientHeight];
@@ -99,11 +101,32 @@ export class Picture {
     this.range = low <= high ? [low, high] : [0, 1];
   }
 
+  // The colours of the labels in the picture, the most frequent ones first.
+  private explain(message: image_t): void {
+    const counts = new Map<number, number>();
+    for (let y = 0; y < message.height; ++y)
+      for (let x = 0; x < message.width; ++x) {
+        const label = valueOf(message, x, y, "labels");
+        if (label > 0) counts.set(label, (counts.get(label) ?? 0) + 1);
+      }
+    const shown = [...counts].sort((a, b) => b[1] - a[1]).slice(0, kMostLabels),
+      words = shown.map(([label]) => `label ${label}`).join();
+    this.legend.hidden = shown.length === 0;
+    if (this.legend.dataset.labels === words) return;
+    this.legend.dataset.labels = words;
+    this.legend.replaceChildren(
+      ...shown.map(([label]) =>
+        h("span", {}, h("i", { style: `--colour: rgb(${colourOf(label).join()})` }), String(label)),
+      ),
+    );
+  }
+
   show(message: image_t): void {
     const { width, height, pixelformat, data } = message;
     this.raw = message;
     this.quantity = quantityOf(message, this.deviceKind);
     if (this.quantity !== "colour" && width * height <= kMostPixels) this.measure(message);
+    if (this.quantity === "labels" && width * height <= kMostPixels) this.explain(message);
     this.tell();
     if (pixelformat === image_t.PIXEL_FORMAT_MJPEG) {
       this.next = new Blob([data as BlobPart], { type: "image/jpeg" });
@@ -162,6 +185,12 @@ function pixelsOf(message: image_t, quantity: Quantity, [low, high]: [number, nu
   return pixels;
 }
 
+const colourOf = (label: number): [number, number, number] => [
+  ((label * 97) % 200) + 55,
+  ((label * 57) % 200) + 55,
+  ((label * 151) % 200) + 55,
+];
+
 function pixel(format: number, view: DataView, row: number, x: number): [number, number, number] {
   const byte = (at: number) => (at < view.byteLength ? view.getUint8(at) : 0);
   switch (format) {
@@ -179,9 +208,7 @@ function pixel(format: number, view: DataView, row: number, x: number): [number,
     case image_t.PIXEL_FORMAT_LE_GRAY16: {
       // a colour for each label
       const label = row + 2 * x + 2 <= view.byteLength ? view.getUint16(row + 2 * x, true) : 0;
-      return label === 0
-        ? [0, 0, 0]
-        : [((label * 97) % 200) + 55, ((label * 57) % 200) + 55, ((label * 151) % 200) + 55];
+      return label === 0 ? [0, 0, 0] : colourOf(label);
     }
     default: {
       const grey = byte(row + x);

@@ -12,6 +12,7 @@ import type {
   Playback,
   RunEvent,
   RunLink,
+  Warning,
 } from "./protocol";
 
 // From messages with their times.
@@ -195,6 +196,7 @@ export class Link implements RunLink {
       first?: number;
       channels?: string[];
       events?: RunEvent[];
+      warnings?: Warning[];
       comparison?: Comparison;
       ended?: string;
       refused?: string;
@@ -207,6 +209,7 @@ export class Link implements RunLink {
         this.channels[said.first! + i] = name;
       });
     if (said.events) this.handler.events(said.first!, said.events);
+    if (said.warnings) this.handler.warnings(said.first!, said.warnings);
     if (said.comparison) this.handler.comparison(said.comparison);
     if (said.refused !== undefined) this.handler.refused(said.refused);
     if (said.ended !== undefined) {

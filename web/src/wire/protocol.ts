@@ -58,11 +58,18 @@ export interface LinkHandler {
   playback(playback: Playback): void;
   // Events from that index on. From 0 on: earlier ones are no longer valid.
   events(first: number, events: RunEvent[]): void;
+  // What the program has warned of, from that index on.
+  warnings(first: number, warnings: Warning[]): void;
   // The result of the comparison with the other log.
   comparison(comparison: Comparison): void;
   message(channel: string, bytes: Uint8Array): void;
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
   refused(channel: string): void;
+}
+
+export interface Warning {
+  kind: string; // "warning", "error", "unsupported" or "repaired"
+  text: string;
 }
 
 // What a page can ask of a run, be it through a socket or of a log in the page itself.

@@ -107,6 +107,7 @@ export class Rewind implements RunLink {
       scene: (number) => handler.scene(number),
       playback: (playback) => handler.playback(playback),
       events: (first, events) => handler.events(first, events),
+      warnings: (first, warnings) => handler.warnings(first, warnings),
       comparison: (comparison) => handler.comparison(comparison),
       message: (channel, bytes) => this.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => handler.traffic(channels, messages, sizes),
