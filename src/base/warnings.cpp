@@ -1,3 +1,4 @@
+// One list for the whole process, since warnings come from everywhere.
 #include "base/warnings.h"
 
 #include <algorithm>

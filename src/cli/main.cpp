@@ -22,15 +22,15 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <spdlog/sinks/base_sink.h>
 #include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "base/warnings.h"
 #include "base/option_text.h"
 #include "base/utf8.h"
 #include "base/version.h"
+#include "base/warnings.h"
 #include "cli/support/argument_rules.h"
 #include "cli/support/commands.h"
 #include "cli/support/progress_line.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "base/warnings.h"
 #include "base/json.h"
+#include "base/warnings.h"
 
 namespace ruedo::console {
 namespace {

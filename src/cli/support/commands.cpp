@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "base/warnings.h"
 #include "base/option_text.h"
+#include "base/warnings.h"
 #include "base/whole.h"
 #include "cli/support/extensions.h"
 #include "log/header.h"
@@ -236,8 +236,8 @@ void print_findings(const std::vector<Finding>& findings) {
         group.places.size() > 1
             ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1)
             : "";
-    keep_warning(kind_name(group.kind), fmt::format("{}: {}: {}{}", first.source.str(),
-                                                    first.element, group.text, more));
+    keep_warning(kind_name(group.kind),
+                 fmt::format("{}: {}: {}{}", first.source.str(), first.element, group.text, more));
     const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
     to_stderr("{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off,
               first.source.str(), first.element, group.text, style.dim, more, style.off);
