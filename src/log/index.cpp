@@ -23,7 +23,7 @@ size_t Index::Channel::count_until(SimTime time_us) const {
 }
 
 Index::Index(const std::string& path) {
-  Reader reader(path);
+  Reader reader(path, "indexing");
   Event event;
   std::unordered_map<std::string, size_t> known;  // looked up only
   const auto wanted = [&](const std::string& channel) {

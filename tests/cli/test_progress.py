@@ -69,8 +69,8 @@ def commands(log, tmp_path):
     bitmap.write_bytes(b"P5 40 40 255\n" + bytes([0] * 40 + [255] * 1520 + [0] * 40))
     return {
         "verify": (("verify", log), "repeating .*run.lcm"),
-        "export": (("export", log, tmp_path / "a.mcap"), "reading .*run.lcm"),
-        "bag": (("export", log, "--ros2", tmp_path / "bag"), "reading .*run.lcm"),
+        "export": (("export", log, tmp_path / "a.mcap"), "(indexing|exporting) .*run.lcm"),
+        "bag": (("export", log, "--ros2", tmp_path / "bag"), "(indexing|exporting) .*run.lcm"),
         "diff": (("diff", log, log), "reading .*run.lcm"),
         "map": (("map", ARENA, "-o", tmp_path / "a.yaml"), "drawing the map"),
         "import": (

@@ -233,3 +233,68 @@ def test_while_a_mesh_is_imported_nothing_is_left(told, shown, tmp_path):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     assert not list(temporary.iterdir()) and not (tmp_path / "bus").exists()
+
+
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    """The arena for 20 s, and then its messages again and again: 100 MB, which take a command a
+    second of the processor's time."""
+    folder = tmp_path_factory.mktemp("long")
+    short, path = folder / "short.lcm", folder / "run.lcm"
+    options = ["--disable", "p3at/camera", "--rate", "max", "--duration", "20", "--lcm", "memq://"]
+    subprocess.run(
+        [RUEDO, "run", "arena", "--quiet", *options, "--record", short],
+        check=True,
+        timeout=PATIENCE,
+    )
+    log = lcm.EventLog(str(short), "r")
+    found = [(event.timestamp, event.channel, event.data) for event in log]
+    log.close()
+    written = lcm.EventLog(str(path), "w", overwrite=True)
+    for again in range(100_000_000 // short.stat().st_size):
+        for timestamp, channel, data in found:
+            if again == 0 or not channel.startswith("ruedo/"):
+                written.write_event(timestamp + again * 20_000_000, channel, data)
+    written.close()
+    return path
+
+
+@pytest.mark.parametrize("told", ["INT", "TERM"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("export", "LOG", "out.mcap"),
+        ("export", "LOG", "--ros2", "bag"),
+        ("play", "LOG", "--html", "out.html", "--html-size", "100"),
+        ("play", "LOG", "--view", "127.0.0.1:0"),
+        ("diff", "LOG", "LOG", "--html", "out.html"),
+        ("info", "LOG"),
+    ],
+)
+def test_a_long_command_ends_at_once_and_leaves_nothing(words, told, long_log, tmp_path):
+    """Wherever a signal meets it, and what was there before stays."""
+    number = getattr(signal, f"SIG{told}")
+    for name in ("out.mcap", "out.html"):
+        (tmp_path / name).write_text("as before")
+    before = sorted(tmp_path.iterdir())
+    for share in (0.1, 0.3):  # s of its work
+        process = subprocess.Popen(
+            [RUEDO, *(str(long_log) if word == "LOG" else word for word in words)],
+            cwd=tmp_path,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        begin = processor_seconds(process)
+        while process.poll() is None and processor_seconds(process) < begin + share:
+            time.sleep(0.005)
+        if process.poll() is not None:
+            assert words[0] == "info"  # the others take longer
+            continue
+        process.send_signal(number)
+        worked = processor_seconds(process)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        assert process.returncode in (-number, 128 + number)
+        assert used.ru_utime + used.ru_stime - worked < 0.2
+        assert sorted(tmp_path.iterdir()) == before
+        assert all(path.read_text() == "as before" for path in before)

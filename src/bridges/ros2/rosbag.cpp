@@ -64,6 +64,7 @@ Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options)
                      "--ros2: " + folder_ + " is there already; a bag gets a folder of its own");
   fs::create_directories(folder_, error);
   if (error) throw EnvironmentError(folder_ + " cannot be made: " + error.message());
+  leftover_.emplace(folder_);
   file_ = fs::path(folder_).filename().string() + "_0.mcap";
   out_ = std::make_unique<log::McapWriter>((fs::path(folder_) / file_).string(), "ros2");
   rest_file_ = (fs::path(folder_) / (std::string(".") + kRest)).string();
@@ -225,6 +226,7 @@ void Rosbag::finish(const std::optional<log_header_t>& header, const std::string
   out_->finish();
   write_file((fs::path(folder_) / "metadata.yaml").string(), metadata());
   finished_ = true;
+  leftover_.reset();
 }
 
 }  // namespace ruedo::ros2

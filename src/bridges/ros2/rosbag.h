@@ -21,6 +21,7 @@
 #include "log/writer.h"
 #include "ruedo/log_header_t.hpp"
 #include "run/repeat/log_worlds.h"
+#include "system/leftovers.h"
 
 namespace ruedo::ros2 {
 
@@ -68,6 +69,7 @@ class Rosbag {
   std::string metadata() const;
 
   std::string folder_, file_, rest_file_;
+  std::optional<Leftover> leftover_;  // the folder, until it is a bag
   ros2::ConversionOptions options_;
   std::optional<ros2::Names> names_;
   std::unique_ptr<log::McapWriter> out_;

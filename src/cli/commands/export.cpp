@@ -11,6 +11,7 @@
 #include "cli/support/extensions.h"
 #include "cli/support/logged_run.h"
 #include "cli/support/sandboxed.h"
+#include "cli/support/signal_thread.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
 #include "run/repeat/log_worlds.h"
@@ -35,7 +36,7 @@ uint64_t nanoseconds(SimTime time_us) {
 template <class Export>
 uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds,
                   Export& out) {
-  log::Reader log(path);
+  log::Reader log(path, "exporting");
   const run::LogWorlds::Scene* scene = nullptr;
   log::Event event;
   SimTime now_us = index.begin_us();
@@ -97,6 +98,7 @@ int export_log(const ExportArguments& arguments) {
   read_given_types();
   if (arguments.sandboxed)
     enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
+  const SignalThread signals;
   const log::Index index(arguments.log);
   run::LoggedRun logged;
   const run::LogWorlds worlds(

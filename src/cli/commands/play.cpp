@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csignal>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "cli/support/extensions.h"
 #include "cli/support/range.h"
 #include "cli/support/sandboxed.h"
+#include "cli/support/signal_thread.h"
 #include "cli/support/view.h"
 #include "log/header.h"
 #include "log/reader.h"
@@ -70,13 +72,20 @@ bool sleep_until(Clock::time_point time) {
   return false;
 }
 
-int view(const PlayArguments& arguments, const std::string& log, const std::string& other,
-         double speed) {
+// Of what is shown, which may take long to read: until then a signal ends the program at once.
+int show(const PlayArguments& arguments, double speed) {
+  std::optional<SignalThread> signals(std::in_place);
+  const ros2::BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
+  if (!arguments.html.empty())
+    return write_page(first.path(), arguments.html, arguments.html_size), kGood;
   if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm goes not with --view: the page shows the log, and nothing is published");
-  const auto serving = view_log(log, arguments.view, speed, other);
+  const auto serving = view_log(first.path(), arguments.view, speed, second.path());
+  heed(SIGINT);
+  heed(SIGTERM);
+  signals.reset();
   while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
   return kGood;
 }
@@ -86,13 +95,11 @@ int play(const PlayArguments& arguments) {
   read_given_types();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html}, arguments.other);
   const double speed = parse_rate(arguments.speed, "--speed");
+  if (!arguments.html.empty() || arguments.viewed) return show(arguments, speed);
   heed(SIGINT);
   heed(SIGTERM);
-  const ros2::BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
-  if (!arguments.html.empty())
-    return write_page(first.path(), arguments.html, arguments.html_size), kGood;
-  if (arguments.viewed) return view(arguments, first.path(), second.path(), speed);
-  log::Reader log(first.path());
+  const ros2::BagLog played(arguments.log);  // as a log, where it is a bag
+  log::Reader log(played.path());
   bus::LcmBus bus(arguments.lcm);
   bus.keep_connected();
   if (const std::string server = bus::claimed_by(bus.url());

@@ -8,6 +8,7 @@
 #include "cli/support/extensions.h"
 #include "cli/support/logged_run.h"
 #include "cli/support/sandboxed.h"
+#include "cli/support/signal_thread.h"
 #include "engine/thread_limit.h"
 #include "log/header.h"
 #include "run/repeat/verify.h"
@@ -89,6 +90,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
 int verify(const VerifyArguments& arguments) {
   load_given_plugins();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {});
+  const SignalThread signals;
   const log_header_t header = run::read_header(arguments.log);
   log::check_files(header, arguments.log);
   return with_options_of(arguments.log, [&] { return repeat(arguments, header); });

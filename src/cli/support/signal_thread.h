@@ -1,4 +1,5 @@
-// SIGINT, SIGTERM and SIGHUP (unless that is ignored, as by nohup) end a run cleanly.
+// SIGINT, SIGTERM and SIGHUP (unless that is ignored, as by nohup) end a run cleanly, and other
+// long commands at once, with nothing left behind (system/leftovers.h).
 #pragma once
 
 #include <atomic>
@@ -40,7 +41,7 @@ class SignalThread {
  private:
   void wait();
 
-  sigset_t signals_{};
+  sigset_t signals_{}, before_{};
   std::atomic<bool> done_{false};
   std::atomic<run::Run*> server_{nullptr};
   std::atomic<int> told_{0};
