@@ -46,16 +46,17 @@ bool are_pictures(const log::Index::Channel& channel) {
   return channel.fingerprint == image_t::getHash();
 }
 
-// Which entries of a channel remain if no two are closer than that; always including the first and
-// the last.
+// Which entries of a channel remain if there is one for each such interval, the first in it; always
+// including the last.
 std::vector<size_t> thinned(const log::Index::Channel& channel, SimTime interval_us) {
   std::vector<size_t> kept;
+  SimTime due_us = std::numeric_limits<SimTime>::min();
   for (size_t i = 0; i < channel.entries.size(); ++i) {
     const log::Index::Entry& entry = channel.entries[i];
     const bool last = i + 1 == channel.entries.size();
-    if (entry.size > kMostMessage) continue;
-    if (kept.empty() || last || entry.time_us - channel.entries[kept.back()].time_us >= interval_us)
-      kept.push_back(i);
+    if (entry.size > kMostMessage || (entry.time_us < due_us && !last)) continue;
+    kept.push_back(i);
+    if (interval_us > 0) due_us = entry.time_us - entry.time_us % interval_us + interval_us;
   }
   return kept;
 }
@@ -69,14 +70,23 @@ size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
   return sum;
 }
 
-// The smallest interval for which they fit; -1 if there is none.
+// The smallest interval for which they fit, to a hundredth; -1 if there is none.
 SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) {
-  for (SimTime interval_us = 0;
-       interval_us <= 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
-       interval_us = interval_us == 0 ? kFirstInterval_us : interval_us * 2) {
-    if (size_of(index, pictures, interval_us) <= room) return interval_us;
+  const auto fits = [&](SimTime interval_us) {
+    return size_of(index, pictures, interval_us) <= room;
+  };
+  if (fits(0)) return 0;
+  const SimTime longest_us = 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
+  SimTime fits_us = kFirstInterval_us;
+  while (!fits(fits_us)) {
+    if (fits_us > longest_us) return -1;
+    fits_us *= 2;
   }
-  return -1;
+  for (SimTime low_us = fits_us / 2; fits_us - low_us > fits_us / 100 + 1;) {
+    const SimTime middle_us = low_us + (fits_us - low_us) / 2;
+    (fits(middle_us) ? fits_us : low_us) = middle_us;
+  }
+  return fits_us;
 }
 
 class Writer {
@@ -102,9 +112,11 @@ class Writer {
     }
     const bool draws = !scan.drawn().layers().empty();
     const size_t left = (room - bytes_.size()) / 4 * (draws ? 3 : 4);
-    const SimTime pictures = interval_that_fits(index_, true, left / 2);
+    SimTime pictures = interval_that_fits(index_, true, left / 2);
     const SimTime interval = interval_that_fits(
         index_, false, left - (pictures < 0 ? 0 : size_of(index_, true, pictures)));
+    if (interval == 0)  // the pictures have what the others do not need
+      pictures = interval_that_fits(index_, true, left - size_of(index_, false, 0));
     if (interval < 0)
       throw InputError(
           {log}, fmt::format(

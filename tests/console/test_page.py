@@ -56,7 +56,7 @@ def test_it_works_from_the_disk(log, tmp_path, size):
             found[round(share * (len(found) - 1))] for share in (0.9, 0.1, 1.0, 0.5)
         )
     ]
-    interval = re.search(r"at least ([\d.]+) s apart", done.stdout)
+    interval = re.search(r"a message of a channel each ([\d.]+) s", done.stdout)
     near = 1e-3 + 0.5 * (
         2 * float(interval.group(1)) if interval else 0
     )  # m; the newest message may be that old
@@ -115,3 +115,23 @@ def test_a_failed_regression_leaves_its_page(tmp_path):
     assert (tmp_path / "run.lcm.html").read_bytes().startswith(
         b"<!doctype html>"
     ) and "run.lcm.html" in done.stdout
+
+
+@pytest.mark.parametrize("size", [3, 5])
+def test_a_page_is_nearly_as_large_as_it_may_be(log, tmp_path, size):
+    """Of a log that is much larger; half of a page was empty."""
+    import lcm
+
+    log = lcm.EventLog(str(log), "r")
+    found = [(event.timestamp, event.channel, event.data) for event in log]
+    log.close()
+    path = tmp_path / "long.lcm"
+    written = lcm.EventLog(str(path), "w", overwrite=True)
+    for again in range(20_000_000 // sum(len(data) for _, _, data in found) + 1):
+        for timestamp, channel, data in found:
+            if again == 0 or not channel.startswith("ruedo/"):
+                written.write_event(timestamp + again * 5_000_000, channel, data)
+    written.close()
+    done = page_of(path, tmp_path / "out.html", "--html-size", str(size))
+    assert done.returncode == 0, done.stderr
+    assert 0.8 * size * 1e6 <= (tmp_path / "out.html").stat().st_size <= size * 1e6, done.stdout

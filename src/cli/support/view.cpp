@@ -97,10 +97,10 @@ void write_page(const std::string& log, const std::string& path, double most_meg
       whole<size_t>(most_megabytes * 1e6));
   std::string thinned;
   if (page.interval_s > 0)
-    thinned += fmt::format(", messages of a channel at least {:g} s apart", page.interval_s);
+    thinned += fmt::format(", a message of a channel each {:g} s", page.interval_s);
   if (page.pictures_s != 0)
     thinned += page.pictures_s < 0 ? ", without pictures"
-                                   : fmt::format(", pictures {:g} s apart", page.pictures_s);
+                                   : fmt::format(", a picture each {:g} s", page.pictures_s);
   if (!page.fault.empty()) to_stderr("ruedo: {}: {}\n", log, page.fault);
   fmt::print("{}: {:.1f} MB{}\n", path, static_cast<double>(page.bytes) * 1e-6, thinned);
 }
