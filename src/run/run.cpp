@@ -318,7 +318,8 @@ std::string Run::why_idle() {
     who = "its program, which has not come this far: is it stopped, or is a callback slow?";
   std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
   if (why.empty()) return "";
-  return fmt::format("{} (the last state was that of step {})", why, publisher_.step());
+  return starts ? why + " (there is no state yet)"
+                : fmt::format("{} (the last state was that of step {})", why, publisher_.step());
 }
 
 bool Run::waits_for_launcher() const {
