@@ -84,8 +84,12 @@ def main(sets):
             for name, true, one in values:
                 rows.setdefault(name, []).append((true, one))
             print(number, world, file=sys.stderr, flush=True)
-    print(f"{sets} sets; worlds: {', '.join(f'{w} {worlds.count(w)}' for w in sorted(set(worlds)))}\n")
-    print("| Value | determined | truth within the 95 % interval | median error | 90 % of errors below |")
+    print(
+        f"{sets} sets; worlds: {', '.join(f'{w} {worlds.count(w)}' for w in sorted(set(worlds)))}\n"
+    )
+    print(
+        "| Value | determined | truth within the 95 % interval | median error | 90 % of errors below |"
+    )
     print("|---|---|---|---|---|")
     for name, every in rows.items():
         known = [(true, one) for true, one in every if one.value is not None]
