@@ -233,8 +233,9 @@ def _summary(path: str) -> dict[str, LogChannel]:
         for event in events(path):
             time = event.timestamp * 1e-6
             its = _types().get(event.data[:8])
-            known = every.get(event.channel) or LogChannel(its.__name__ if its else "", 0, time, 0)
-            every[event.channel] = known._replace(messages=known.messages + 1, end=time)
+            name = its.__name__ if its else ""
+            type_name, messages, begin, _ = every.get(event.channel) or (name, 0, time, 0)
+            every[event.channel] = LogChannel(type_name, messages + 1, begin, time)
         return every
     found, fault = _engine.summarize_log(os.fsencode(path))
     if fault:

@@ -91,9 +91,6 @@ class PoseMethods:
         w, x, y, z = self.orientation
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
-    def _shown_besides(self) -> str:
-        return f", heading={self.heading:g}"
-
 
 _RAW = {
     "gray": ("u1", 1),

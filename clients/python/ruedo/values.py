@@ -34,7 +34,8 @@ class Value:
         shown = ", ".join(
             f"{field.name}={_short(getattr(self, field.name))}" for field in fields(values)
         )
-        more = getattr(self, "_shown_besides", str)()  # of some samples
+        heading = getattr(self, "heading", None)  # of poses, beside the quaternion
+        more = "" if heading is None else f", heading={heading:g}"
         return f"{type(self).__name__}({shown}{more})"
 
 

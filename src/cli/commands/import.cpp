@@ -2,11 +2,12 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
+#include <cstdio>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
+#include "base/input_file.h"
 #include "cli/support/commands.h"
 #include "cli/support/python.h"
 #include "cli/support/range.h"
@@ -38,9 +39,8 @@ void check_sizes(const ImportArguments& arguments, const std::string& what,
 bool is_recorded_drive(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) return true;
   std::string head(512, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(file.gcount()));
+  const InputFile in = open_to_look(path.string());
+  head.resize(std::fread(head.data(), 1, head.size(), in.file.get()));
   for (const char* begin :
        {"\x1f\x8b", "\xed\xa1\xda\x01", "#ROSBAG", "\x89MCAP", "SQLite format 3", "FLASER ",
         "ROBOTLASER1 ", "ODOM ", "PARAM ", "# message formats"}) {

@@ -46,9 +46,9 @@ void print_header(const log_header_t& header, const Style& style) {
 
 void print_text(const log::Summary& log, const std::string& path) {
   const Style style = style_of(stdout);
-  fmt::print("{}{}{}: {}, {}, {:g} s of sim time ({:g} to {:g} s), {}\n", style.bold,
-             for_terminal(path), style.off, bytes_text(log.size),
-             counted(static_cast<size_t>(log.messages), "message"),
+  fmt::print("{}{}{}: {}, {} message{}, {:g} s of sim time ({:g} to {:g} s), {}\n", style.bold,
+             for_terminal(path), style.off, bytes_text(log.size), log.messages,
+             log.messages == 1 ? "" : "s",
              seconds_of(log.end_us - log.begin_us), seconds_of(log.begin_us),
              seconds_of(log.end_us), log.fault.empty() ? "whole" : log.fault);
   if (!log.fault.empty())
