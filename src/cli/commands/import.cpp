@@ -1,8 +1,8 @@
 // ruedo import: the maps of ROS, Stage and MobileSim, and recorded drives, as worlds with walls.
 #include <algorithm>
 #include <cctype>
-#include <filesystem>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -39,8 +39,8 @@ void check_sizes(const ImportArguments& arguments, const std::string& what,
 bool is_recorded_drive(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) return true;
   std::string head(512, '\0');
-  const InputFile in = open_to_look(path.string());
-  head.resize(std::fread(head.data(), 1, head.size(), in.file.get()));
+  const InputFile input = open_to_look(path.string());
+  head.resize(std::fread(head.data(), 1, head.size(), input.file.get()));
   for (const char* begin :
        {"\x1f\x8b", "\xed\xa1\xda\x01", "#ROSBAG", "\x89MCAP", "SQLite format 3", "FLASER ",
         "ROBOTLASER1 ", "ODOM ", "PARAM ", "# message formats"}) {
