@@ -193,9 +193,6 @@ TEST(Scene, ActorsWalkAsCylinders) {
   EXPECT_FALSE(p.model->path->boolean("ruedo:loop", true));
   EXPECT_EQ(p.X_WM.translation, Vec3(1, 2, 0));
   EXPECT_FALSE(p.model->is_static);
-  const auto skins = testing::Contains(testing::HasSubstr("skins and animations are not shown"));
-  EXPECT_THAT(texts(*world), skins);
-  EXPECT_THAT(texts(*world_of("<actor name='p'/>")), testing::Not(skins));
   const auto odd = world_of(
       "<actor name='p'><script><trajectory id='0'><waypoint><time>1</time><pose>1 2 1 0 0 "
       "0</pose></waypoint><waypoint><time>1</time><pose>0 0 1 0 0 0</pose>"

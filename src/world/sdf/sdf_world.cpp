@@ -325,7 +325,7 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   model->name = required_name(actor);
   model->source = actor.source;
   const std::string where = "actor " + model->name;
-  if (actor.has("skin"))
+  if (!has_own_shape(actor))
     context.findings.unsupported(
         actor.source, where,
         "actors move as cylinders of 1.7 m; skins and animations are not shown");
