@@ -63,7 +63,7 @@ def vocabulary_module(vocabulary: Vocabulary) -> list[str]:
 
 
 def exported(names: Iterable[str]) -> list[str]:
-    return ["__all__ = [", *(f'    "{name}",' for name in sorted(names)), "]"]
+    return ["__all__: list[str] = [", *(f'    "{name}",' for name in sorted(names)), "]"]
 
 
 def is_array(one: Field) -> bool:

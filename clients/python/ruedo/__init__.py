@@ -14,6 +14,7 @@ themselves.
 """
 
 from importlib.util import find_spec
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from ._installation import load_glib
@@ -59,13 +60,15 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .vocabulary import *  # noqa: F403
     from .world import World
     from .world_info import Body
+else:
+    samples = vocabulary = SimpleNamespace(__all__=[])
 
 
 def __getattr__(name: str) -> object:
     """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
     it is first asked for.
     """
-    if not _HAS_NUMPY and name in __all__:
+    if not _HAS_NUMPY and not name.startswith("_"):
         raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")
     if name not in ("Engine", "SavedWorld"):
         raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
@@ -117,5 +120,4 @@ __all__ = [
     "open_log",
     "read_log",
 ]
-if TYPE_CHECKING or _HAS_NUMPY:
-    __all__ += samples.__all__ + vocabulary.__all__
+__all__ += samples.__all__ + vocabulary.__all__

@@ -346,6 +346,7 @@ def _joined(cells: list[Any], kind: str, dimensions: list[Any] | None) -> Any:
     inner = [size for size in dimensions[1:] if isinstance(size, int)]
 
     def array(cell: Any) -> Any:
+        flat: Any
         flat = np.frombuffer(cell, number) if isinstance(cell, bytes) else np.array(cell, number)
         return flat.reshape(-1, *inner) if len(inner) == len(dimensions) - 1 else flat
 

@@ -48,9 +48,9 @@ void print_text(const log::Summary& log, const std::string& path) {
   const Style style = style_of(stdout);
   fmt::print("{}{}{}: {}, {} message{}, {:g} s of sim time ({:g} to {:g} s), {}\n", style.bold,
              for_terminal(path), style.off, bytes_text(log.size), log.messages,
-             log.messages == 1 ? "" : "s",
-             seconds_of(log.end_us - log.begin_us), seconds_of(log.begin_us),
-             seconds_of(log.end_us), log.fault.empty() ? "whole" : log.fault);
+             log.messages == 1 ? "" : "s", seconds_of(log.end_us - log.begin_us),
+             seconds_of(log.begin_us), seconds_of(log.end_us),
+             log.fault.empty() ? "whole" : log.fault);
   if (!log.fault.empty())
     fmt::print("{} of {} can be read\n", bytes_text(log.readable), bytes_text(log.size));
   if (log.header)
