@@ -187,7 +187,7 @@ INSTRUMENTS = """<static>true</static><pose>0 3 1 0 0 0</pose><link name='link'>
 <sensor name='imu' type='imu'><update_rate>50</update_rate><imu><angular_velocity><x><noise type='gaussian'>
 <stddev>0.1</stddev><bias_mean>1</bias_mean><bias_stddev>0.5</bias_stddev></noise></x></angular_velocity></imu></sensor>
 </link>"""
-WORLD = HALL.replace("<sdf ", "<sdf xmlns:ruedo='urn:ruedo' ").replace(
+WORLD = HALL.replace(
     "</world>",
     f"""<model name='mast'>{INSTRUMENTS}</model><wind><linear_velocity>5 0 0</linear_velocity></wind>
 <plugin filename='gz-sim-wind-effects-system' name='gz::sim::systems::WindEffects'><horizontal><magnitude>
@@ -401,9 +401,7 @@ FILE = """<ruedo:fault><ruedo:robot>p3at</ruedo:robot><ruedo:target>lrf</ruedo:t
 
 
 def test_in_the_worlds_file_it_is_the_same_and_repeats(tmp_path):
-    text = HALL.replace("</world>", FILE.format(kind="freeze")).replace(
-        "<sdf ", "<sdf xmlns:ruedo='urn:ruedo' "
-    )
+    text = HALL.replace("</world>", FILE.format(kind="freeze"))
     assert [m.encode() for _, m in run(text=text)["lrf"]] == [
         m.encode() for _, m in run("p3at/lrf:freeze@1,for=1")["lrf"]
     ]
