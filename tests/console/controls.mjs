@@ -237,9 +237,9 @@ export default async function controls(tools) {
   check(
     "beside what lies over it, a click reaches the view",
     (await page.evaluate(() => {
-      window.ruedo.page.set({ reduced: true }); // one more chip, in a row of its own
+      window.ruedo.page.set({ reduced: true }); // one more chip, in the row that scrolls
       const { right, bottom } = document.getElementById("legend").getBoundingClientRect();
-      return document.elementFromPoint(right - 2, bottom - 2)?.id;
+      return document.elementFromPoint(right - 2, bottom + 2)?.id;
     })) === "canvas",
     "something else is there",
   );

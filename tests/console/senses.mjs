@@ -59,7 +59,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
   );
   await page.getByRole("tab", { name: "Robot" }).click();
   await until("joints are told", () =>
-    /shoulder-?\d/.test(document.getElementById("joints").textContent),
+    /shoulder-?\d/.test(document.getElementById("joints")?.textContent ?? ""),
   );
   const slider = page.getByLabel("move shoulder");
   check(
