@@ -322,7 +322,8 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     def _commands(
         self, actions: NDArray[Any], acting: NDArray[np.bool_]
     ) -> NDArray[np.float64] | None:
-        self.task.acting = acting
+        self.task.acting = acting.copy()
+        self.task.acting.setflags(write=False)  # of this call alone: no part of an episode
         given = self.task.commands(actions)
         if given is None:
             return None
