@@ -405,7 +405,8 @@ def _cells(column: Any) -> Any:
     """As a DataFrame has them: the bytes of pictures and maps as bytes."""
     if column.ndim == 1 and column.dtype != object:
         return column
-    if column.dtype == np.uint8:
+    first = column[0] if len(column) else None
+    if isinstance(first, np.ndarray) and first.dtype == np.uint8:
         return _objects((one.tobytes() for one in column), len(column))
     return _objects(column, len(column)) if column.ndim > 1 else column
 
