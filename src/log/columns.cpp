@@ -58,10 +58,10 @@ void GrowingBytes::Free::operator()(std::byte* bytes) const { std::free(bytes); 
 std::byte* GrowingBytes::grow(size_t size) {
   if (size_ + size > room_) {
     const size_t room = std::max(size_ + size, room_ + room_ / 4 + 64);
-    void* bytes = std::realloc(bytes_.get(), room);  // of much memory: moves pages, copies nothing
+    std::byte* const old = bytes_.release();
+    void* bytes = std::realloc(old, room);  // of much memory: moves pages, copies nothing
+    bytes_.reset(bytes == nullptr ? old : static_cast<std::byte*>(bytes));
     if (bytes == nullptr) throw std::bad_alloc();
-    (void)bytes_.release();
-    bytes_.reset(static_cast<std::byte*>(bytes));
     room_ = room;
   }
   size_ += size;
@@ -72,9 +72,12 @@ void GrowingBytes::append(int64_t value) { std::memcpy(grow(sizeof value), &valu
 
 std::byte* GrowingBytes::release() {
   if (size_ == 0) return nullptr;
-  void* bytes = std::realloc(bytes_.get(), size_);
-  if (bytes == nullptr) throw std::bad_alloc();
-  (void)bytes_.release();
+  std::byte* const old = bytes_.release();
+  void* bytes = std::realloc(old, size_);
+  if (bytes == nullptr) {
+    bytes_.reset(old);
+    throw std::bad_alloc();
+  }
   size_ = room_ = 0;
   return static_cast<std::byte*>(bytes);
 }

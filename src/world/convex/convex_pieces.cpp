@@ -172,7 +172,7 @@ void join(std::vector<ConvexPiece>& pieces, size_t most, double allowed) {
     volumes[i] = volume_of(pieces[i]);
     pieces[j].corners.clear();
     std::erase_if(gains, [&](const auto& each) {
-      const auto& [a, b] = each.first;
+      const size_t a = each.first.first, b = each.first.second;
       return a == i || a == j || b == i || b == j;
     });
     for (size_t k = 0; k < pieces.size(); ++k) {
