@@ -172,6 +172,7 @@ void join(std::vector<ConvexPiece>& pieces, size_t most, double allowed) {
     volumes[i] = volume_of(pieces[i]);
     pieces[j].corners.clear();
     std::erase_if(gains, [&](const auto& each) {
+      // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): each is one of the map's
       const size_t a = each.first.first, b = each.first.second;
       return a == i || a == j || b == i || b == j;
     });
