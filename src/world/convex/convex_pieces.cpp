@@ -171,11 +171,10 @@ void join(std::vector<ConvexPiece>& pieces, size_t most, double allowed) {
     pieces[i] = both(i, j);
     volumes[i] = volume_of(pieces[i]);
     pieces[j].corners.clear();
-    std::erase_if(gains, [&](const auto& each) {
-      // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): each is one of the map's
-      const size_t a = each.first.first, b = each.first.second;
-      return a == i || a == j || b == i || b == j;
-    });
+    for (auto each = gains.begin(); each != gains.end();) {
+      const auto [a, b] = each->first;
+      each = a == i || a == j || b == i || b == j ? gains.erase(each) : std::next(each);
+    }
     for (size_t k = 0; k < pieces.size(); ++k) {
       if (k != i && !pieces[k].corners.empty()) measure(std::min(i, k), std::max(i, k));
     }
