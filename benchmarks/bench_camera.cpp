@@ -7,7 +7,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "sensors/pixel_noise.h"
 #include "world/load.h"
 #include "world/mesh/codecs.h"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "world/load.h"
 
 namespace {

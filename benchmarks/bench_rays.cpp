@@ -16,7 +16,7 @@
 
 #include "bench/bare_embree.h"
 #include "ruedo/random.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 
 namespace {
 

@@ -12,7 +12,7 @@
 
 #include "engine/fleet.h"
 #include "ruedo/sensor.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "world/load.h"
 #include "world/model/body_layout.h"
 

@@ -179,7 +179,7 @@ def bare_reads(root):
 OUTPUT = "src/system/output_file.h"
 WRITTEN = re.compile(r"\bstd::ofstream\b|\bfopen\([^;]*\"[wa]")
 # Files that grow piece by piece.
-STREAMED = {"src/bridges/ros2/bag_log.cpp", "src/log/mcap_writer.cpp", "src/console/log_page.cpp"}
+STREAMED = {"src/bridges/ros2/bag/bag_log.cpp", "src/log/mcap_writer.cpp", "src/console/log_page.cpp"}
 
 
 def bare_writes(root):
@@ -605,7 +605,7 @@ def tree(folder, files):
 @pytest.mark.parametrize(
     "name, include, good",
     [
-        ("src/sensors/lrf.cpp", '"scene/ray_scene.h"', True),
+        ("src/sensors/lrf.cpp", '"scene/rays/ray_scene.h"', True),
         ("src/sensors/lrf.cpp", '"base/x.h"', True),
         ("src/sensors/lrf.cpp", '"physics/physics_world.h"', False),
         ("src/scene/ray.cpp", '"sensors/lrf.h"', False),
@@ -618,8 +618,8 @@ def tree(folder, files):
         ("src/cli/main.cpp", '"bench/bench.h"', False),
         ("src/bench/bench.cpp", '"cli/support/range.h"', True),
         ("src/physics/joints/block.cpp", '"physics/base/rows.h"', True),
-        ("src/physics/joints/block.cpp", '"scene/ray_scene.h"', False),
-        ("src/engine/judge/judge.cpp", '"scene/ray_scene.h"', True),
+        ("src/physics/joints/block.cpp", '"scene/rays/ray_scene.h"', False),
+        ("src/engine/judge/judge.cpp", '"scene/rays/ray_scene.h"', True),
         ("src/engine/judge/judge.cpp", '"physics/world.h"', False),
         ("src/engine/judge/judge.cpp", '"engine/world.h"', False),
         ("src/engine/world.cpp", '"engine/judge/judge.h"', False),

@@ -8,12 +8,12 @@
 #include <system_error>
 #include <utility>
 
-#include "address.h"
+#include "transport/address.h"
 #include "ends.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "server_process.h"
-#include "wire_reader.h"
+#include "samples/wire_reader.h"
 
 namespace ruedo::client {
 namespace {

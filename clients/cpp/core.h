@@ -15,21 +15,21 @@
 #include <thread>
 #include <vector>
 
-#include "bus.h"
-#include "callback_faults.h"
-#include "callback_queue.h"
-#include "callbacks.h"
+#include "transport/bus.h"
+#include "callbacks/callback_faults.h"
+#include "callbacks/callback_queue.h"
+#include "callbacks/callbacks.h"
 #include "driver.h"
-#include "forked.h"
+#include "transport/forked.h"
 #include "progress.h"
 #include "ruedo/client.h"
 #include "run_watch.h"
 #include "session.h"
 #include "sim_clock.h"
 #include "standstill.h"
-#include "stepper.h"
+#include "lockstep/stepper.h"
 #include "stream_core.h"
-#include "world_info.h"
+#include "samples/world_info.h"
 
 namespace ruedo::client {
 

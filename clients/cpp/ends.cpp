@@ -12,8 +12,8 @@
 #include <system_error>
 #include <thread>
 
-#include "callback_faults.h"
-#include "forked.h"
+#include "callbacks/callback_faults.h"
+#include "transport/forked.h"
 
 namespace ruedo::client {
 namespace {

@@ -11,7 +11,7 @@
 #include "base/big_endian.h"
 #include "base/lcm_log.h"
 #include "base/message_size.h"
-#include "sample_types.h"
+#include "samples/sample_types.h"
 
 namespace ruedo::client {
 namespace {

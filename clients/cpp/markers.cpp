@@ -6,7 +6,7 @@
 #include "core.h"
 #include "ruedo/client_markers.h"
 #include "ruedo/markers_t.hpp"
-#include "world_info.h"
+#include "samples/world_info.h"
 
 namespace ruedo::client {
 namespace {

@@ -20,7 +20,7 @@
 #include <sstream>
 #include <thread>
 
-#include "address.h"
+#include "transport/address.h"
 #include "base/utf8.h"
 #include "core.h"
 

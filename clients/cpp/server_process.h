@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "forked.h"
+#include "transport/forked.h"
 #include "ruedo/client.h"
 #include "system/file_handle.h"
 

@@ -9,7 +9,7 @@
 #include "ruedo/join_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
-#include "wire_reader.h"
+#include "samples/wire_reader.h"
 
 namespace ruedo::client {
 namespace {

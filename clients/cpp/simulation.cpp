@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "address.h"
+#include "transport/address.h"
 #include "core.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"

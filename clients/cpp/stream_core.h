@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
-#include "callback_queue.h"
-#include "callbacks.h"
+#include "callbacks/callback_queue.h"
+#include "callbacks/callbacks.h"
 #include "ruedo/client.h"
-#include "sample_types.h"
+#include "samples/sample_types.h"
 
 namespace ruedo::client {
 

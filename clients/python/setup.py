@@ -31,7 +31,9 @@ class SdistWithTypes(sdist):
 
 
 # With proto/ at hand the build makes the types; from an sdist they are a package like any other.
-packages = ["ruedo", "ruedo.campaign", "ruedo.fit", "ruedo.gym", "ruedo.hunt"] + (
+packages = [
+    f"ruedo{part}" for part in ("", ".campaign", ".fit", ".gym", ".hunt", ".session", ".transport")
+] + (
     [] if PROTO.is_dir() else ["ruedo.lcmtypes"]
 )
 version = (

@@ -5,7 +5,7 @@
 #include <ruedo/sensor.h>
 
 #include "example/thermometer_t.hpp"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "sensors/noise.h"
 #include "world/model/body_layout.h"
 

@@ -88,7 +88,7 @@ struct Command {
   Command at(int64_t steps) const { return {channel, bytes, steps}; }
 };
 
-class CallbackCore;  // clients/cpp/callbacks.h
+class CallbackCore;  // clients/cpp/callbacks/callbacks.h
 class Core;          // a connection; clients/cpp/core.h
 class StreamCore;    // a subscription; clients/cpp/stream_core.h
 struct MotionCore;

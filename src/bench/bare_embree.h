@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/ray_embree.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_embree.h"
+#include "scene/rays/ray_scene.h"
 #include "world/mesh/mesh.h"
 
 namespace ruedo::bench {

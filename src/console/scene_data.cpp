@@ -11,9 +11,9 @@
 
 #include "base/input_file.h"
 #include "base/json.h"
-#include "scene/overview.h"
-#include "scene/render_content.h"
-#include "scene/render_texture.h"
+#include "scene/pictures/overview.h"
+#include "scene/pictures/render_content.h"
+#include "scene/pictures/render_texture.h"
 #include "world/mesh/codecs.h"
 #include "world/model/body_layout.h"
 

@@ -16,8 +16,8 @@
 #include "engine/batch.h"
 #include "engine/faults/sensor_faults.h"
 #include "ruedo/sensor.h"
-#include "scene/ray_scene.h"
-#include "scene/render_scene.h"
+#include "scene/rays/ray_scene.h"
+#include "scene/pictures/render_scene.h"
 
 namespace ruedo::engine {
 

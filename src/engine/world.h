@@ -18,7 +18,7 @@
 #include "engine/module.h"
 #include "physics/physics_world.h"
 #include "robot/robots.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::engine {

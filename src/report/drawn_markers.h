@@ -8,7 +8,7 @@
 #include "log/index.h"
 #include "log/reader.h"
 #include "ruedo/markers_t.hpp"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 
 namespace ruedo::report {
 

@@ -7,7 +7,7 @@
 #include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/sonar_t.hpp"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 
 namespace ruedo::report {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/sensor.h"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::report {

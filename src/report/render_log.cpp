@@ -19,8 +19,8 @@
 #include "ruedo/errors.h"
 #include "ruedo/world_state_t.hpp"
 #include "run/repeat/log_worlds.h"
-#include "scene/overview.h"
-#include "scene/render_scene.h"
+#include "scene/pictures/overview.h"
+#include "scene/pictures/render_scene.h"
 #include "system/to_stderr.h"
 
 namespace ruedo::report {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "ruedo/pose.h"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 
 namespace ruedo::report {
 

@@ -15,7 +15,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "sensors/camera_lens.h"
 #include "sensors/camera_view.h"
 #include "sensors/jpeg.h"

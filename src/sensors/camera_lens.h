@@ -12,7 +12,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "ruedo/element.h"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 
 namespace ruedo {
 

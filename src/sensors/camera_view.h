@@ -5,7 +5,7 @@
 
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "sensors/camera_lens.h"
 #include "sensors/mount.h"
 

@@ -3,7 +3,7 @@
 
 #include "ruedo/bound.h"
 #include "ruedo/sensor.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo {

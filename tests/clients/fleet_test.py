@@ -26,7 +26,7 @@ def module_of(path, name):
     return module
 
 
-PLAIN = module_of(SOURCE / "clients/python/ruedo/arrivals.py", "plain_arrivals")
+PLAIN = module_of(SOURCE / "clients/python/ruedo/transport/arrivals.py", "plain_arrivals")
 BENCHMARK = module_of(SOURCE / "benchmarks/bench_lockstep_fleet.py", "bench_lockstep_fleet")
 
 
@@ -196,7 +196,7 @@ STEPS = """
 import hashlib, sys
 if sys.argv[2] == "without": sys.modules["ruedo._engine"] = None
 import ruedo
-from ruedo import arrivals
+from ruedo.transport import arrivals
 with ruedo.connect(sys.argv[1], name="one", timeout=400.0) as sim:
     robot, digest = sim.robot("p3at"), hashlib.sha256()
     for _ in range(30):

@@ -141,7 +141,7 @@ def test_who_says_no_hello_is_no_server(language, stream_url, sent):
 
 def test_a_server_that_reads_nothing_is_left(stream_url):
     """What it does not take within seconds is lost, as it is where there is no server."""
-    from ruedo.transport import open_transport
+    from ruedo.transport.transport import open_transport
 
     with LyingStream(stream_url, HELLO + INFO):
         transport = open_transport(stream_url)

@@ -26,11 +26,11 @@ import pytest
 import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import lcmtypes, samples
-from ruedo.address import read_address
-from ruedo.control import Session
+from ruedo.transport.address import read_address
+from ruedo.session.control import Session
 from ruedo.decoding import decode
 from ruedo.launch import _options
-from ruedo.multicast_transport import MulticastTransport
+from ruedo.transport.multicast import MulticastTransport
 
 QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
 
@@ -680,7 +680,7 @@ def test_a_leave_is_repeated_a_few_times(in_turn, monkeypatch):
 @pytest.mark.parametrize("kind", ["launched", "unix", "tcpq"])
 def test_a_server_that_has_ended_is_not_waited_for(kind, monkeypatch, tmp_path):
     """Its answer to a LEAVE is awaited for much longer than the test may take."""
-    monkeypatch.setattr("ruedo.control._MOST_LEAVES", int(100.0 * PATIENCE))
+    monkeypatch.setattr("ruedo.session.control._MOST_LEAVES", int(100.0 * PATIENCE))
     if kind == "launched":
         sim = ruedo.launch(HALL, **QUICK)
         sim.pause()

@@ -171,7 +171,8 @@ def marked(program, lab, folder):
     shutil.copytree(SOURCE / "clients/python/examples/labs", folder / "marked")
     marking = folder / "marked/marking"
     if program != "solution":
-        shutil.copy(HERE / f"files/labs/{program}.py", marking / "students")
+        (source,) = (HERE / "files/labs").glob(f"*/{program}.py")
+        shutil.copy(source, marking / "students")
     file = (marking / "labs.yaml").read_text()
     for before, after in (
         ("students/*.py", f"students/{program}.py"),

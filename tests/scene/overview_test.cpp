@@ -1,5 +1,5 @@
 // What of a world is shown from outside: outliers do not count, the floor is what robots stand on.
-#include "scene/overview.h"
+#include "scene/pictures/overview.h"
 
 #include <string>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "ruedo/random.h"
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::scene {

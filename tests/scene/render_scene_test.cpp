@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "ruedo/errors.h"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::scene {

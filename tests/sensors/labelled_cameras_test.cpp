@@ -10,7 +10,7 @@
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/image_t.hpp"
 #include "ruedo/logical_camera_t.hpp"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "sensors/sensor_bench.h"
 
 namespace ruedo {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/ray_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "sensors/sensor_bench.h"
 
 namespace ruedo::test {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "ruedo/image_t.hpp"
-#include "scene/render_scene.h"
+#include "scene/pictures/render_scene.h"
 #include "sensors/sensor_bench.h"
 
 namespace ruedo {

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <sdf/sdf.hh>
 
-#include "bridges/ros2/robot_frames.h"
+#include "bridges/ros2/messages/robot_frames.h"
 #include "world/load.h"
 
 namespace ruedo::ros2 {

@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from . import arguments
-from .address import has_multicast_route, read_address
+from .transport.address import has_multicast_route, read_address
 from .errors import LaunchError, NoServer, for_terminal
-from .progress import FIRST
+from .session.progress import FIRST
 from .simulation import Simulation
-from .stream_transport import is_served
+from .transport.stream import is_served
 from .world import World
 
 _MOST_HEARD = 1 << 16  # bytes of warnings that are read at once

@@ -19,10 +19,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from . import arrivals, lcmtypes
+from . import lcmtypes
+
+from .transport import arrivals
 from .arguments import shown
 from .channel_names import ChannelNames
-from .control import state_of
+from .session.control import state_of
 from .decoding import decode
 from .errors import (
     LeaseLost,
@@ -38,7 +40,7 @@ from .samples import State
 from .stream import Stream, sample_of
 
 if TYPE_CHECKING:
-    from .connection import Connection
+    from .session.connection import Connection
     from .world_info import WorldInfo
 
 T = TypeVar("T")

@@ -15,7 +15,7 @@ from .samples import Collisions, MotionStatus
 
 if TYPE_CHECKING:
     from .callbacks import Subscription
-    from .connection import Connection
+    from .session.connection import Connection
     from .robot import Robot
     from .world_info import WorldInfo
 

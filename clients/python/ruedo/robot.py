@@ -36,7 +36,7 @@ from .stream import RAW, Form, Stream, form_of
 
 if TYPE_CHECKING:
     from .callbacks import Subscription
-    from .connection import Connection
+    from .session.connection import Connection
 
 T = TypeVar("T")
 

@@ -13,17 +13,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from . import arguments, control, lcmtypes
-from .address import resolve_url
+from . import arguments, lcmtypes
+
+from .session import control
+from .transport.address import resolve_url
 from .callbacks import Subscription
-from .connection import Connection, PrivateServer
+from .session.connection import Connection, PrivateServer
 from .errors import NotSupported, RunEnded
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
 from .requests import Requests
 from .robot import Robot
 from .samples import State
-from .transport import Transport
+from .transport.transport import Transport
 from .world_info import Body, WorldInfo
 
 

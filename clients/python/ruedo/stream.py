@@ -20,7 +20,7 @@ from .errors import RuedoError, Timeout, TypeMismatch
 from .fast_decoding import DECODERS
 
 if TYPE_CHECKING:
-    from .connection import Connection
+    from .session.connection import Connection
     from .world_info import WorldInfo
 
 T = TypeVar("T")

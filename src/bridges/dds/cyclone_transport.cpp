@@ -27,7 +27,7 @@
 #include "bridges/dds/raw_type.h"
 #include "bridges/dds/reply_ends.h"
 #include "bridges/ros2/fair_queue.h"
-#include "bridges/ros2/interfaces.h"
+#include "bridges/ros2/messages/interfaces.h"
 #include "ruedo/errors.h"
 #include "system/enough_threads.h"
 

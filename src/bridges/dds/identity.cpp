@@ -9,7 +9,7 @@
 
 #include "base/big_endian.h"
 #include "bridges/dds/sockets.h"
-#include "bridges/ros2/cdr.h"
+#include "bridges/ros2/messages/cdr.h"
 
 namespace ruedo::dds {
 namespace {

@@ -16,7 +16,7 @@
 #include "engine/markers.h"
 #include "ruedo/decode.h"
 #include "ruedo/math.h"
-#include "scene/render_content.h"
+#include "scene/pictures/render_content.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::foxglove {

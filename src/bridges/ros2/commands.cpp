@@ -2,7 +2,7 @@
 // utime is 0: what is recorded of a run must not depend on when a node sent it.
 #include "bridges/ros2/commands.h"
 
-#include "bridges/ros2/cdr.h"
+#include "bridges/ros2/messages/cdr.h"
 #include "engine/outcome.h"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "bridges/ros2/names.h"
+#include "bridges/ros2/messages/names.h"
 #include "bridges/ros2/topic.h"
 #include "ruedo/world_info_t.hpp"
 

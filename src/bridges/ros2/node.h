@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "bridges/ros2/commands.h"
-#include "bridges/ros2/conversions.h"
-#include "bridges/ros2/diagnostics.h"
-#include "bridges/ros2/markers.h"
-#include "bridges/ros2/requests.h"
-#include "bridges/ros2/services.h"
+#include "bridges/ros2/messages/conversions.h"
+#include "bridges/ros2/messages/diagnostics.h"
+#include "bridges/ros2/messages/markers.h"
+#include "bridges/ros2/services/requests.h"
+#include "bridges/ros2/services/services.h"
 #include "bridges/ros2/transport.h"
 #include "run/sink.h"
 

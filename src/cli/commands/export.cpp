@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "bridges/foxglove/foxglove.h"
-#include "bridges/ros2/rosbag.h"
+#include "bridges/ros2/bag/rosbag.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
 #include "cli/support/logged_run.h"

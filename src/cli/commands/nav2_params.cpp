@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "bridges/ros2/conversions.h"
+#include "bridges/ros2/messages/conversions.h"
 #include "cli/support/commands.h"
 #include "cli/support/find_all.h"
 #include "engine/fleet.h"

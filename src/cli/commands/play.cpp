@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "bridges/ros2/bag_log.h"
+#include "bridges/ros2/bag/bag_log.h"
 #include "bus/lcm_bus.h"
 #include "bus/url_claim.h"
 #include "cli/support/commands.h"

@@ -16,7 +16,7 @@
 #include "report/render_view.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
-#include "scene/overview.h"
+#include "scene/pictures/overview.h"
 #include "system/output_file.h"
 #include "world/mesh/codecs.h"
 #include "world/settings.h"

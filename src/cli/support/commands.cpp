@@ -20,7 +20,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
 #include "run/pacer.h"
-#include "scene/mesas_environment.h"
+#include "scene/gl/mesas_environment.h"
 #include "system/to_stderr.h"
 
 namespace ruedo::cli {

@@ -7,7 +7,7 @@
 #include "base/progress.h"
 #include "base/utf8.h"
 #include "engine/world.h"
-#include "scene/render_texture.h"
+#include "scene/pictures/render_texture.h"
 
 namespace ruedo::cli {
 namespace {

@@ -1,5 +1,5 @@
 // CDR by hand: alignment, strings, sequences, both byte orders, and malformed bytes.
-#include "bridges/ros2/cdr.h"
+#include "bridges/ros2/messages/cdr.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,12 +1,12 @@
 // The health of a run over times and counts that the test gives.
-#include "bridges/ros2/diagnostics.h"
+#include "bridges/ros2/messages/diagnostics.h"
 
 #include <map>
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "bridges/ros2/cdr.h"
+#include "bridges/ros2/messages/cdr.h"
 
 namespace ruedo::ros2 {
 namespace {

@@ -1,10 +1,10 @@
 // Hashes against those of ROS 2's own packages; test_bag.py compares all of them with rosbags.
-#include "bridges/ros2/interfaces.h"
+#include "bridges/ros2/messages/interfaces.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bridges/ros2/names.h"
+#include "bridges/ros2/messages/names.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::ros2 {

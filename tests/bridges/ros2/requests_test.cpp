@@ -1,5 +1,5 @@
 // Requests of many ROS clients reach the run as those of one client.
-#include "bridges/ros2/requests.h"
+#include "bridges/ros2/services/requests.h"
 
 #include <chrono>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Frames of links by hand; test_links.py holds /tf against robot_description and joint_states.
-#include "bridges/ros2/robot_frames.h"
+#include "bridges/ros2/messages/robot_frames.h"
 
 #include <algorithm>
 #include <stdexcept>

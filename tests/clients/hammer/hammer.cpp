@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "bus.h"
+#include "transport/bus.h"
 
 using namespace ruedo::client;
 

@@ -9,8 +9,8 @@ import sys
 import threading
 import time
 
-from ruedo.bus import Bus
-from ruedo.transport import open_transport
+from ruedo.transport.bus import Bus
+from ruedo.transport.transport import open_transport
 
 THREADS, CHANNELS = 8, 4
 

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "callback_queue.h"
+#include "callbacks/callback_queue.h"
 #include "fake_transport.h"
 #include "progress.h"
 

@@ -1,5 +1,5 @@
 // What a stranger may have a client keep of ruedo/info.
-#include "world_info.h"
+#include "samples/world_info.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

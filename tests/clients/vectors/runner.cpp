@@ -10,9 +10,9 @@
 #include <sstream>
 
 #include "core.h"
-#include "sample_types.h"
+#include "samples/sample_types.h"
 #include "server_process.h"
-#include "transport.h"
+#include "transport/transport.h"
 
 using namespace ruedo::client;
 

@@ -1,0 +1,78 @@
+// What little samples can compute, and samples of any type. Their decoders are made from
+// proto/vocabulary.toml.
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "samples/sample_types.h"
+
+namespace ruedo::client {
+
+double Scan::nearest(double from_angle, double to_angle) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < ranges.size(); ++i) {
+    if (angle(i) >= from_angle && angle(i) <= to_angle)
+      nearest = std::min(nearest, static_cast<double>(ranges[i]));
+  }
+  return nearest;
+}
+
+double Pose::heading() const {
+  const auto [w, x, y, z] = orientation;
+  return std::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+}
+
+void Image::save(const std::string& path) const {
+  std::ofstream file(path, std::ios::binary);
+  if (format == Format::jpeg) {
+    file.write(reinterpret_cast<const char*>(data.data()),
+               static_cast<std::streamsize>(data.size()));
+  } else if (format == Format::rgb || format == Format::bgr || format == Format::gray) {
+    const int channels = format == Format::gray ? 1 : 3;
+    const size_t row_bytes =
+        static_cast<size_t>(std::max(width, 0)) * static_cast<size_t>(channels);
+    const size_t stride = row_stride > 0 ? static_cast<size_t>(row_stride) : row_bytes;
+    if (width <= 0 || height <= 0 || stride < row_bytes ||
+        data.size() / stride < static_cast<size_t>(height)) {
+      throw Error(path + ": the picture's size does not fit its " + std::to_string(data.size()) +
+                  " bytes");
+    }
+    file << (channels == 1 ? "P5 " : "P6 ") << width << ' ' << height << " 255\n";
+    std::string row(row_bytes, '\0');
+    for (size_t y = 0; y < static_cast<size_t>(height); ++y) {
+      std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(y * stride), row_bytes, row.begin());
+      if (format == Format::bgr) {
+        for (size_t x = 0; x < row_bytes; x += 3) std::swap(row[x], row[x + 2]);
+      }
+      file << row;
+    }
+  } else {
+    throw Error(path + ": this kind of picture has no common file format");
+  }
+  file.close();
+  if (!file) throw Error(path + " cannot be written");
+}
+
+RawSample raw_sample(WireReader in) {
+  RawSample sample;
+  sample.bytes = in.whole();
+  return sample;
+}
+
+const SampleDecoder* raw_decoder() {
+  static const SampleDecoder decoder{"", 0, [](WireReader& in) -> std::shared_ptr<const Sample> {
+                                       return std::make_shared<RawSample>(raw_sample(in));
+                                     }};
+  return &decoder;
+}
+
+#define RUEDO_MESSAGE_TYPE(SampleType, type) \
+  template <>                                \
+  const char* message_type<SampleType>() {   \
+    return #type;                            \
+  }
+RUEDO_SAMPLE_TYPES(RUEDO_MESSAGE_TYPE)
+#undef RUEDO_MESSAGE_TYPE
+
+}  // namespace ruedo::client

@@ -1,0 +1,1 @@
+"""One connection to a run: its clock, requests, callbacks and end."""

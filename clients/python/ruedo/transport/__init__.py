@@ -1,0 +1,1 @@
+"""Carries messages: LCM's multicast, TCP and the local socket, each behind Transport."""

@@ -1,0 +1,62 @@
+// What clients draw as visualization_msgs/MarkerArray: a layer is a namespace.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bridges/ros2/messages/cdr.h"
+#include "bridges/ros2/messages/names.h"
+#include "bridges/ros2/transport.h"
+#include "ruedo/markers_t.hpp"
+
+namespace ruedo::ros2 {
+
+class MarkerArrays {
+ public:
+  static constexpr const char* kType = "visualization_msgs/msg/MarkerArray";
+
+  // CDR by which a viewer shows these markers in place of the layer's earlier ones. frame: in which
+  // they stand. They are those of a run: see engine::check_markers().
+  std::vector<uint8_t> message(const markers_t& markers, int64_t utime, const std::string& frame);
+
+ private:
+  std::map<std::string, size_t> shown_;  // how many, by layer that has any
+};
+
+// An arrow, which is gone a moment later; for a message of markers. Positions in the frame, m.
+struct Arrow {
+  const double *from, *to;
+  std::string text;
+};
+void put_arrow(CdrWriter& out, int64_t utime, const std::string& frame, const std::string& layer,
+               int32_t id, const Arrow& arrow);
+
+// What clients have drawn in a run so far, on a topic of its own. Who comes later is sent the
+// newest of each layer: a writer keeps one message for latecomers, of one layer.
+class DrawnTopic {
+ public:
+  static constexpr size_t kMostLayers = 64;  // the newest of them; others are taken away
+
+  DrawnTopic(std::unique_ptr<Writer> writer, const Names& names);
+
+  // What a client drew, of a record of the run; anything else is none of it.
+  void take(std::span<const uint8_t> record, int64_t utime);
+  // Looks who has come since the last time.
+  void look(int64_t utime);
+  const Writer& writer() const { return *writer_; }
+
+ private:
+  void send(const markers_t& markers, int64_t utime);
+
+  std::unique_ptr<Writer> writer_;
+  const Names& names_;
+  MarkerArrays arrays_;
+  std::vector<markers_t> layers_;  // that have something, the newest last
+  size_t readers_ = 0;
+};
+
+}  // namespace ruedo::ros2
