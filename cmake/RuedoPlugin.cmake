@@ -6,7 +6,7 @@ set(RUEDO_PLUGIN_HEADERS include/ruedo/bound.h include/ruedo/decode.h include/ru
   include/ruedo/math.h include/ruedo/plugin.h include/ruedo/pose.h include/ruedo/quantity.h include/ruedo/random.h include/ruedo/schema.h include/ruedo/sensor.h
   include/ruedo/sim_time.h include/ruedo/snapshot.h include/ruedo/state_archive.h)
 # Headers of the lower layers, under the names by which sources in this tree include them.
-set(RUEDO_PLUGIN_LAYER_HEADERS world/model/body_layout.h world/model/fault.h world/mesh/mesh.h world/model/world_model.h scene/rays/ray_scene.h scene/pictures/render_scene.h sensors/noise.h)
+set(RUEDO_PLUGIN_LAYER_HEADERS world/model/body_layout.h world/model/fault.h world/model/mesh.h world/model/world_model.h scene/rays/ray_scene.h scene/pictures/render_scene.h sensors/noise.h)
 
 set(headers ${RUEDO_PLUGIN_HEADERS})
 foreach(header ${RUEDO_PLUGIN_LAYER_HEADERS})

@@ -39,6 +39,25 @@ LIBRARIES = {
 }
 
 
+# The rooms of a layer, from the lowest up: a room may include those before it.
+# Files that lie in no room are above all.
+ROOMS = {
+    "world": (
+        "document",
+        "convex",
+        "model",
+        "mesh",
+        "read",
+        "maps",
+        "compat",
+        "drives",
+        "urdf",
+        "edit",
+        "sdf",
+    ),
+}
+
+
 def layers(root):
     """{layer: the layers it may include, itself among them}, from CMakeLists.txt. A layer is a
     folder below src/, such as "bridges/ros2". The command line may include all of them, and the
@@ -96,6 +115,50 @@ def broken_walls(root):
                     problems.append(
                         f"{relative}:{number}: {name} belongs to {', '.join(sorted(homes))}, not to {layer}"
                     )
+    return problems
+
+
+def broken_rooms(root):
+    """Includes from a room of ROOMS of one that is above it."""
+    problems = []
+    for layer, rooms in ROOMS.items():
+        for path in sorted((root / "src" / layer).rglob("*")):
+            room = path.relative_to(root / "src" / layer).parts[0]
+            if path.suffix not in (".cpp", ".h") or path.parent.name == layer:
+                continue
+            if room not in rooms:
+                problems.append(f"{path.relative_to(root)}: {room} is not in ROOMS")
+                continue
+            for number, name in includes(path):
+                parts = name.split("/")
+                if parts[0] != layer:
+                    continue
+                if len(parts) == 2 or rooms.index(parts[1]) > rooms.index(room):
+                    problems.append(
+                        f"{path.relative_to(root)}:{number}: {room} may not include {name}"
+                    )
+    return problems
+
+
+MOST_FILES = 40  # of a folder that can still be read through
+MAY_BE_FULL = {
+    "src/sensors",  # one file for each sensor
+    "clients/java/src/ruedo",  # a package of Java is one folder
+    "proto",  # one file for each message
+}
+
+
+def full_folders(root):
+    """Folders with more files than a reader can look through."""
+    problems = []
+    for top in ("src", "include", "clients", "tests", "proto", "web/src", "scripts", "cmake"):
+        for folder in sorted((root / top).rglob("")):
+            name = folder.relative_to(root).as_posix()
+            if name in MAY_BE_FULL or "node_modules" in folder.parts:
+                continue
+            count = sum(1 for file in folder.iterdir() if file.is_file())
+            if count > MOST_FILES:
+                problems.append(f"{name}: {count} files; at most {MOST_FILES}: make rooms of it")
     return problems
 
 
@@ -179,7 +242,11 @@ def bare_reads(root):
 OUTPUT = "src/system/output_file.h"
 WRITTEN = re.compile(r"\bstd::ofstream\b|\bfopen\([^;]*\"[wa]")
 # Files that grow piece by piece.
-STREAMED = {"src/bridges/ros2/bag/bag_log.cpp", "src/log/mcap_writer.cpp", "src/console/log_page.cpp"}
+STREAMED = {
+    "src/bridges/ros2/bag/bag_log.cpp",
+    "src/log/mcap_writer.cpp",
+    "src/console/log_page.cpp",
+}
 
 
 def bare_writes(root):
@@ -383,6 +450,69 @@ def circles(imports):
     return found
 
 
+# The packages of the Python client, and which others each may import; "" are the modules outside of
+# all. What builds on the client is never imported by it.
+PYTHON_PACKAGES = {
+    "": {"transport", "session"},
+    "transport": {""},
+    "session": {"", "transport"},
+    "campaign": {""},
+    "hunt": {"", "campaign"},
+    "gym": {""},
+    "fit": {""},
+}
+
+
+def python_imports(root):
+    """{module: the modules that it imports when it is loaded, or for its types}, as dotted names
+    below the client's package.
+    """
+    client = root / PYTHON_CLIENT
+    names = {
+        path: ".".join(path.relative_to(client).with_suffix("").parts).removesuffix(".__init__")
+        for path in sorted(client.rglob("*.py"))
+    }
+    found = {}
+    for path, module in names.items():
+        package = path.relative_to(client).parent.parts
+        outside, targets = [ast.parse(path.read_text(encoding="utf-8"))], set()
+        while outside:
+            for node in ast.iter_child_nodes(outside.pop()):
+                if isinstance(node, ast.ImportFrom) and node.level:
+                    base = [*package[: len(package) - node.level + 1]]
+                    base += node.module.split(".") if node.module else []
+                    whole = ".".join(base)
+                    each = {".".join([*base, one.name]) for one in node.names}
+                    targets |= (each & set(names.values())) or {whole}
+                elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                    outside.append(node)
+        found[module] = {t for t in targets if t in names.values()} - {module, "__init__"}
+    return found
+
+
+def broken_python_walls(root):
+    """Modules of the Python client that import one another in a circle, or a package beyond those
+    that PYTHON_PACKAGES allows.
+    """
+    imports = python_imports(root)
+    problems = [f"{PYTHON_CLIENT}: a circle: {' -> '.join(circle)}" for circle in circles(imports)]
+
+    def package_of(module):
+        head, _, rest = module.partition(".")
+        return head if rest or head in PYTHON_PACKAGES else ""
+
+    for module, targets in imports.items():
+        if module == "__init__":
+            continue
+        own = package_of(module)
+        problems += [
+            f"{PYTHON_CLIENT}/{module}: may not import {target}"
+            for target in sorted(targets)
+            if package_of(target) not in PYTHON_PACKAGES[own] | {own}
+        ]
+    return problems
+
+
 def broken_web_walls(root):
     """The page's modules import those of the layers below alone, none in a circle; and a view is
     used by one module: by the page, or by the view that it is a part of.
@@ -392,7 +522,7 @@ def broken_web_walls(root):
     for module, targets in imports.items():
         layer = module.split("/")[0]
         if layer not in WEB_LAYERS:
-            problems.append(f"{WEB}/{module}.ts: {layer} is no layer of the page")
+            problems.append(f"{WEB}/{module}.ts: {layer} is not a layer of the page")
             continue
         for target in sorted(targets):
             below = target.split("/")[0]
@@ -413,6 +543,8 @@ def broken_web_walls(root):
     "rule",
     [
         broken_walls,
+        broken_rooms,
+        full_folders,
         bare_conversions,
         bare_reads,
         bare_writes,
@@ -422,6 +554,7 @@ def broken_web_walls(root):
         foreign_members,
         states_left_behind,
         broken_web_walls,
+        broken_python_walls,
     ],
 )
 def test_tree_keeps(rule):
@@ -474,6 +607,15 @@ def test_every_room_says_what_it_is_for():
         assert 3 <= len(text) <= 15, room
         for link in re.findall(r"\]\(([^)]+)\)", "\n".join(text)):
             assert (room / link).exists(), f"{room}: {link}"
+
+
+def test_the_walks_name_functions_that_are_there():
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    steps = re.findall(r"\| `([\w:]+)` in `([\w/.]+)` \|", page)
+    assert len(steps) > 15
+    for function, path in steps:
+        text = (ROOT / path).read_text(encoding="utf-8")
+        assert re.search(rf"\b{function}\(", text), f"{path} does not define {function}"
 
 
 def test_the_map_is_that_of_the_layers():
@@ -641,6 +783,32 @@ def test_walls_are_seen(tmp_path, name, include, good):
 
 
 @pytest.mark.parametrize(
+    "name, include, good",
+    [
+        ("src/world/sdf/sdf_model.cpp", '"world/compat/plugins.h"', True),
+        ("src/world/read/frames.cpp", '"world/model/world_model.h"', True),
+        ("src/world/model/ground.cpp", '"world/read/read_context.h"', False),
+        ("src/world/urdf/urdf.cpp", '"world/sdf/sdf_link.h"', False),
+        ("src/world/sdf/sdf_world.cpp", '"world/load.h"', False),
+        ("src/world/load.cpp", '"world/sdf/sdf_reader.h"', True),
+        ("src/world/cellar/x.cpp", '"world/model/world_model.h"', False),
+    ],
+)
+def test_walls_of_rooms_are_seen(tmp_path, name, include, good):
+    assert (
+        broken_rooms(tree(tmp_path, {name: f"#pragma once\n#include {include}\n"})) == []
+    ) == good
+
+
+def test_full_folders_are_seen(tmp_path):
+    files = {f"src/base/f{i}.cpp": "" for i in range(MOST_FILES + 1)}
+    assert full_folders(tree(tmp_path, files))
+    del files["src/base/f0.cpp"]
+    (tmp_path / "other").mkdir()
+    assert not full_folders(tree(tmp_path / "other", files))
+
+
+@pytest.mark.parametrize(
     "text, good",
     [
         ("int64_t n = std::llround(x);", False),
@@ -760,7 +928,7 @@ def test_members_of_other_modules_are_seen(tmp_path, text, good):
         ({"ui/a": "./b", "ui/b": "", "ui/c": "./b"}, "more than one: ui/a, ui/c"),
         ({"ui/a": "./b", "ui/b": "", "app/c": "../ui/b"}, "more than one: app/c, ui/a"),
         ({"state/a": "./b", "state/b": "./a"}, "a circle: state/a -> state/b -> state/a"),
-        ({"more/a": ""}, "more is no layer"),
+        ({"more/a": ""}, "more is not a layer"),
         ({"app/a": "", "app/long": "\n" * (MOST_LINES_OF_APP + 1)}, "251 lines"),
     ],
 )
@@ -773,3 +941,31 @@ def test_walls_of_the_page_are_seen(tmp_path, files, problem):
         )
     found = broken_web_walls(tmp_path)
     assert len(found) == (problem is not None) and all(problem in line for line in found)
+
+
+@pytest.mark.parametrize(
+    "files, problem",
+    [
+        ({"robot": "from .motion import Motion\n", "motion": ""}, ""),
+        ({"motion": "from .robot import Robot\n", "robot": "from . import motion\n"}, "a circle"),
+        (
+            {
+                "motion": "if TYPE_CHECKING:\n    from .robot import Robot\n",
+                "robot": "from .motion import Motion\n",
+            },
+            "a circle",
+        ),
+        ({"launch": "def f():\n    from .campaign import cli\n", "campaign/cli": ""}, ""),
+        ({"launch": "from .campaign import cli\n", "campaign/cli": ""}, "may not import"),
+        ({"hunt/hunt": "from ..campaign.plan import Case\n", "campaign/plan": ""}, ""),
+        ({"campaign/plan": "from ..hunt.hunt import Hunt\n", "hunt/hunt": ""}, "may not import"),
+        ({"transport/bus": "from ..session.clock import Clock\n", "session/clock": ""}, "may not"),
+    ],
+)
+def test_walls_of_the_python_client_are_seen(tmp_path, files, problem):
+    for name, text in files.items():
+        path = tmp_path / PYTHON_CLIENT / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    problems = "\n".join(broken_python_walls(tmp_path))
+    assert problem in problems if problem else not problems

@@ -8,12 +8,12 @@
 #include <system_error>
 #include <utility>
 
-#include "transport/address.h"
 #include "ends.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/tick_t.hpp"
-#include "server_process.h"
 #include "samples/wire_reader.h"
+#include "server_process.h"
+#include "transport/address.h"
 
 namespace ruedo::client {
 namespace {
@@ -90,7 +90,7 @@ void Core::join(Duration timeout) {
       handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_tick(bytes, size); }));
   reply_source_ =
       bus_.subscribe("ruedo/reply", handler([](Core& core, const uint8_t* bytes, size_t size) {
-                       core.session_.receive(bytes, size);
+                       core.session_.on_reply(bytes, size);
                      }));
   bus_.start([self = weak_from_this()] {
     const auto core = self.lock();
@@ -406,7 +406,7 @@ std::string Core::what_is_known(double rate) const {
   const double now = static_cast<double>(utime()) * 1e-6;
   char text[192];
   std::snprintf(text, sizeof text,
-                "in lockstep it stands still between calls of step(), whose observations have the "
+                "in lockstep, sim time advances only in step(), whose observations have the "
                 "samples, as in sim.step(20).latest(robot.lrf()); it is at %.2f s",
                 now);
   const std::string why = why_it_stands([&] { return std::string(text); });
@@ -510,8 +510,8 @@ void Core::tell_another_server(int64_t run_id) const {
   const auto known = info();
   std::fprintf(stderr,
                "ruedo: another server is at %s, too, with run %lld; this client is in run %lld, "
-               "world %s. Samples of both mix, and commands go to both: give one of them another "
-               "--lcm port (this is said once)\n",
+               "world %s. Their samples mix, and commands reach both: start one of them with "
+               "another --lcm port (shown once)\n",
                url_.c_str(), static_cast<long long>(run_id), static_cast<long long>(known->run_id),
                known->world.c_str());
 }

@@ -15,21 +15,21 @@
 #include <thread>
 #include <vector>
 
-#include "transport/bus.h"
 #include "callbacks/callback_faults.h"
 #include "callbacks/callback_queue.h"
 #include "callbacks/callbacks.h"
 #include "driver.h"
-#include "transport/forked.h"
+#include "lockstep/stepper.h"
 #include "progress.h"
 #include "ruedo/client.h"
 #include "run_watch.h"
+#include "samples/world_info.h"
 #include "session.h"
 #include "sim_clock.h"
 #include "standstill.h"
-#include "lockstep/stepper.h"
 #include "stream_core.h"
-#include "samples/world_info.h"
+#include "transport/bus.h"
+#include "transport/forked.h"
 
 namespace ruedo::client {
 

@@ -91,7 +91,7 @@ void Driver::listen(const std::shared_ptr<StreamCore>& motion,
   });
 }
 
-void Driver::hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes) {
+void Driver::keep_sending(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes) {
   const std::lock_guard lock(mutex_);
   if (ended_ != MotionReason::none) return;
   held_channel_ = channel;

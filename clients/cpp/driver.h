@@ -63,7 +63,7 @@ class Driver : public std::enable_shared_from_this<Driver> {
   Driver(std::weak_ptr<Core> core, std::string robot, double watchdog);
 
   // Publishes the command now, and again until the next one.
-  void hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
+  void keep_sending(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
   // What is held, and the newest primitive where no status has shown it: by real time.
   void repeat(Bus& bus);
   void repeat_at(int64_t utime, Bus& bus);  // what is held, by sim time

@@ -51,13 +51,13 @@ LogFile::LogFile(std::string path) : path_(std::move(path)) {
   if (regular) file_.open(path_, std::ios::binary);  // opening a FIFO would wait for its writer
   if (!regular || !file_) {
     const bool there = std::filesystem::exists(path_, error);
-    throw Error(path_ + (there ? ": it is no file that can be read" : ": no such file"));
+    throw Error(path_ + (there ? ": it is not a file that can be read" : ": no such file"));
   }
   size_ = static_cast<int64_t>(std::filesystem::file_size(path_));
   int64_t next = 0;
   for (int64_t begin = 0; begin < size_ && add_event(begin, next); begin = next) {
   }
-  if (!fault_.empty() && next == 0) throw Error(path_ + ": it is no LCM log: " + fault_);
+  if (!fault_.empty() && next == 0) throw Error(path_ + ": it is not an LCM log: " + fault_);
 }
 
 // False where the log was cut off, or is damaged.

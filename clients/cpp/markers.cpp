@@ -73,7 +73,7 @@ std::string markers_channel(Core& core) {
   for (const ChannelInfo& channel : info->channel_list) {
     if (channel.input && channel.type == "markers_t") return channel.name;
   }
-  throw NotSupported("this server takes no markers");
+  throw NotSupported("this server does not accept markers");
 }
 
 }  // namespace
@@ -81,8 +81,8 @@ std::string markers_channel(Core& core) {
 namespace markers {
 
 Marker lines(Points points, const Color& color, double width) {
-  require(points.size() % 2 == 0,
-          "lines have two ends each; " + std::to_string(points.size()) + " points are no pairs");
+  require(points.size() % 2 == 0, "lines have two ends each; " + std::to_string(points.size()) +
+                                      " points do not make pairs");
   return with_points(marker_t::LINES, std::move(points), color, width);
 }
 
@@ -106,7 +106,7 @@ Marker text(std::string text, const std::array<double, 3>& place, const Color& c
 Marker map(std::vector<uint8_t> cells, int32_t columns, double resolution,
            const std::array<double, 3>& place, double heading, const Color& color) {
   require(columns >= 1 && !cells.empty() && cells.size() % static_cast<size_t>(columns) == 0,
-          std::to_string(cells.size()) + " cells are no rows of " + std::to_string(columns));
+          std::to_string(cells.size()) + " cells do not fill rows of " + std::to_string(columns));
   require(std::all_of(cells.begin(), cells.end(),
                       [](uint8_t cell) { return cell <= 100 || cell == 255; }),
           "a cell is 0 to 100, or 255 where it is unknown");

@@ -128,10 +128,11 @@ std::shared_ptr<Driver> driver_of(Core& core, const std::string& robot,
   return driver;
 }
 
-void hold(Core& core, const std::string& robot, Command command, const std::string& in_steps) {
+void keep_sending(Core& core, const std::string& robot, Command command,
+                  const std::string& in_steps) {
   const auto driver = driver_of(core, robot, in_steps);
   listen(core, robot, *driver);
-  driver->hold(core.bus(), command.channel, std::move(command.bytes));
+  driver->keep_sending(core.bus(), command.channel, std::move(command.bytes));
   core.keep_repeating(driver);
 }
 
@@ -271,11 +272,11 @@ Camera Robot::camera() const {
 }
 
 void Robot::set_velocity(double v, double omega, double vy) const {
-  hold(*core_, name_, velocity_command(v, omega, vy), "velocity_command(v, omega)");
+  keep_sending(*core_, name_, velocity_command(v, omega, vy), "velocity_command(v, omega)");
 }
 
 void Robot::set_wheels(double left, double right) const {
-  hold(*core_, name_, wheel_command(left, right), "wheel_command(left, right)");
+  keep_sending(*core_, name_, wheel_command(left, right), "wheel_command(left, right)");
 }
 
 Command Robot::velocity_command(double v, double omega, double vy) const {

@@ -20,9 +20,9 @@
 #include <sstream>
 #include <thread>
 
-#include "transport/address.h"
 #include "base/utf8.h"
 #include "core.h"
+#include "transport/address.h"
 
 extern char** environ;
 
@@ -45,7 +45,7 @@ std::string find_ruedo(const std::string& installed) {
   if (const char* named = std::getenv("RUEDO"); named && *named) {
     if (!is_program(named))
       throw LaunchError("the environment's RUEDO is '" + std::string(named) +
-                        "', which is no program");
+                        "', which is not a program");
     return named;
   }
   if (!installed.empty() && is_program(installed)) return installed;

@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "transport/forked.h"
 #include "ruedo/client.h"
 #include "system/file_handle.h"
+#include "transport/forked.h"
 
 namespace ruedo::client {
 

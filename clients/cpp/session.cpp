@@ -148,7 +148,7 @@ void Session::send(int32_t kind, int64_t session, int64_t sequence,
   core_.bus().publish(kRequestChannel, request);
 }
 
-void Session::receive(const uint8_t* bytes, size_t size) {
+void Session::on_reply(const uint8_t* bytes, size_t size) {
   Reply reply;
   try {
     WireReader in(bytes, size);
@@ -184,7 +184,7 @@ void Session::receive(const uint8_t* bytes, size_t size) {
 }
 
 void wrong_body(const char* type, const std::exception& error) {
-  throw TypeMismatch(std::string("the reply's body is no ") + type +
+  throw TypeMismatch(std::string("the reply's body is not a ") + type +
                      " of this client's version: " + error.what());
 }
 

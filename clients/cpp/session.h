@@ -61,7 +61,7 @@ class Session {
   // server may be gone: in that case no longer than that is unknown. It takes no turn: who has that
   // may be a callback in step() that ends the program.
   void leave();
-  void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
+  void on_reply(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
  private:
   void join(Duration timeout);

@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "transport/address.h"
 #include "core.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
@@ -14,6 +13,7 @@
 #include "ruedo/spawn_request_t.hpp"
 #include "ruedo/step_request_t.hpp"
 #include "server_process.h"
+#include "transport/address.h"
 
 namespace ruedo::client {
 namespace {

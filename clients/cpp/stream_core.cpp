@@ -16,12 +16,6 @@ constexpr double kMostUneven = 0.25;  // periods: gaps of samples that are taken
 constexpr size_t kHead = 16;  // bytes of a message: fingerprint, and in all of the server's types
                               // the time
 
-std::string hex(int64_t fingerprint) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(fingerprint));
-  return text;
-}
-
 double period_us(double rate, int64_t step_us) {
   const bool even = rate > 0.0 && static_cast<double>(step_us) * 1e-6 * rate <= kMostUneven;
   return even ? 1e6 / rate : 0.0;
@@ -104,7 +98,7 @@ void StreamCore::subscribe(Core& core) {
     throw mismatch(fingerprint);
   source_ =
       core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
-        if (const auto stream = self.lock()) stream->receive(bytes, size);
+        if (const auto stream = self.lock()) stream->on_message(bytes, size);
       });
 }
 
@@ -133,7 +127,7 @@ void StreamCore::end() {
   }
 }
 
-void StreamCore::receive(const uint8_t* bytes, size_t size) {
+void StreamCore::on_message(const uint8_t* bytes, size_t size) {
   const auto core = core_.lock();
   if (!core || core->closed() || core->in_doubt()) return;
   const int64_t fingerprint = size < kHead ? 0 : read_big_endian<int64_t>(bytes);
@@ -190,7 +184,7 @@ std::shared_ptr<const Sample> StreamCore::decoded(const std::vector<uint8_t>& by
     return decoder_->decode(in);
   } catch (const WireError& error) {
     throw TypeMismatch(channel_ + ": a message of " + std::to_string(bytes.size()) +
-                       " bytes is no valid " + type_ + ": " + error.what());
+                       " bytes is not a valid " + type_ + ": " + error.what());
   }
 }
 

@@ -55,7 +55,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   std::shared_ptr<Core> connection() const;  // throws NoServer once it was closed
   bool is_raw() const { return decoder_ == raw_decoder(); }
   void subscribe(Core& core);
-  void receive(const uint8_t* bytes, size_t size);
+  void on_message(const uint8_t* bytes, size_t size);
   void fail(std::exception_ptr fault);
   void call_back(Arrival& arrival);
   std::shared_ptr<const Sample> decoded(const std::vector<uint8_t>& bytes) const;

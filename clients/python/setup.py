@@ -33,9 +33,7 @@ class SdistWithTypes(sdist):
 # With proto/ at hand the build makes the types; from an sdist they are a package like any other.
 packages = [
     f"ruedo{part}" for part in ("", ".campaign", ".fit", ".gym", ".hunt", ".session", ".transport")
-] + (
-    [] if PROTO.is_dir() else ["ruedo.lcmtypes"]
-)
+] + ([] if PROTO.is_dir() else ["ruedo.lcmtypes"])
 version = (
     read_version(PROTO)
     if PROTO.is_dir()

@@ -21,7 +21,7 @@ class LaggingDrive : public DriveModel {
     return {follow(v_.ahead, input.asked.ahead), follow(v_.left, input.asked.left),
             follow(v_.turn, input.asked.turn)};
   }
-  bool take(const DriveModel& other) override {
+  bool copy_from(const DriveModel& other) override {
     *this = static_cast<const LaggingDrive&>(other);
     return true;
   }

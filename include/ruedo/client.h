@@ -234,7 +234,7 @@ class MessageStream {
       return fail("is another type than, or of another version of, the");
     Message message;
     const int size = static_cast<int>(bytes.size());
-    return message.decode(bytes.data(), 0, size) == size ? message : fail("is no valid");
+    return message.decode(bytes.data(), 0, size) == size ? message : fail("is not a valid");
   }
 
  private:

@@ -56,7 +56,7 @@ class DriveModel {
   /// the world. Where all that it keeps are values: `*this = static_cast<const MyDrive&>(other)`.
   /// @param other made by the same kind from the same element
   /// @return false: it cannot; then a world with this drive has no snapshots
-  virtual bool take([[maybe_unused]] const DriveModel& other) { return false; }
+  virtual bool copy_from([[maybe_unused]] const DriveModel& other) { return false; }
 };
 
 /// A kind of drive: `<ruedo:drive type="TYPE">`.

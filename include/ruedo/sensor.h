@@ -154,7 +154,7 @@ class Sensor {
   /// which depend on no other sample (SensorKind::needs_renderer).
   /// @param other the same device's in another copy of the world
   /// @return false: it cannot; then a world with this device has no snapshots
-  virtual bool take(const Sensor& other) { return static_cast<void>(other), false; }
+  virtual bool copy_from(const Sensor& other) { return static_cast<void>(other), false; }
   /// For snapshots in files: writes what samples to come depend on, or reads it. SensorOf does it
   /// for a class with a function `void exchange(StateArchive&)`. Not asked of pictures, either.
   /// @param archive that writes or reads
@@ -170,7 +170,7 @@ class Sensor {
 template <class Self>
 class SensorOf : public Sensor {
  public:
-  bool take(const Sensor& other) final {
+  bool copy_from(const Sensor& other) final {
     static_cast<Self&>(*this) = static_cast<const Self&>(other);
     return true;
   }

@@ -221,7 +221,7 @@ def decoders(vocabulary: Vocabulary) -> list[str]:
     types = sorted(one.message.name for one in samples)
     lines = [MADE, "// How samples come off the wire, and the texts of enumerations."]
     lines += [f'#include "ruedo/{type}.hpp"' for type in types]
-    lines += ['#include "sample_types.h"', '#include "wire_values.h"', ""]
+    lines += ['#include "samples/sample_types.h"', '#include "samples/wire_values.h"', ""]
     lines += ["namespace ruedo::client {", "namespace {", ""]
     for part in vocabulary.parts.values():
         lines += part_reader(part, vocabulary)
@@ -362,7 +362,7 @@ def requests_source(vocabulary: Vocabulary) -> list[str]:
         '#include "core.h"',
     ]
     lines += [f'#include "ruedo/{type}.hpp"' for type in sorted(types)]
-    lines += ['#include "wire_values.h"', "", "namespace ruedo::client {", ""]
+    lines += ['#include "samples/wire_values.h"', "", "namespace ruedo::client {", ""]
     for reply in vocabulary.replies.values():
         lines += reply_reader(reply, vocabulary)
     for one in vocabulary.made_requests:

@@ -334,9 +334,10 @@ def requests_module(vocabulary: Vocabulary) -> list[str]:
     names |= {one.result.part for one in requests if one.result and one.result.part}
     if any(type.startswith("NDArray") for type in results):
         lines += ["import numpy as np", "from numpy.typing import NDArray", ""]
-    lines += ["from . import arguments, lcmtypes", "from .session.control import Session, reply_of"]
+    lines += ["from . import arguments, lcmtypes"]
     lines += ["from .geometry import Floats"] if "Floats" in results else []
     lines += imported("samples", sorted(names))
+    lines += ["from .session.control import Session, reply_of"]
     lines += ["", "", "class Requests:"]
     lines += docstring(
         "Each raises NotSupported where the server has no such request, RequestError when it refuses,"

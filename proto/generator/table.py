@@ -324,7 +324,7 @@ def _request(
             raise Fault(f"{where}: there is no {name} {given[name]}")
     for code in given.get("errors", {}):
         if code not in codes:
-            raise Fault(f"{where}: {code} is no code of reply_t: {', '.join(codes)} are")
+            raise Fault(f"{where}: {code} is not a code of reply_t: {', '.join(codes)} are")
     body = messages.get(given.get("body", ""))
     if given.get("arguments") and not body:
         raise Fault(f"{where}: arguments need a body")
@@ -383,7 +383,7 @@ def _check_references(record: Record, vocabulary: Vocabulary) -> None:
             raise Fault(f"{where}: there is no part {one.part}")
         for language in one.languages:
             if language not in LANGUAGES:
-                raise Fault(f"{where}: {language} is no language: {', '.join(LANGUAGES)} are")
+                raise Fault(f"{where}: {language} is not a language: {', '.join(LANGUAGES)} are")
         _check_member(where, one)
     if record.name in vocabulary.samples and not vocabulary.has_utime(record):
         raise Fault(f"{record.name}: its message does not begin with int64_t utime")

@@ -8,18 +8,11 @@
 #include <stdexcept>
 
 #include "base/element_watch.h"
+#include "base/text.h"
 #include "base/whole.h"
 
 namespace ruedo {
 namespace {
-
-constexpr std::string_view kSpace = " \t\r\n\f\v";
-
-std::string_view trimmed(std::string_view text) {
-  const size_t begin = text.find_first_not_of(kSpace);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kSpace) - begin + 1);
-}
 
 std::string in_lower_case(std::string_view text) {
   std::string lower(text);
@@ -27,14 +20,6 @@ std::string in_lower_case(std::string_view text) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   return lower;
-}
-
-// A number in words: 0.5, not 0.500000; 1000000000, not 1e+09.
-std::string shown(double value) {
-  if (value == std::floor(value) && std::abs(value) < 1e15) return std::to_string(whole(value));
-  char buffer[32];
-  const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);
-  return {buffer, result.ptr};
 }
 
 // A value in quotes, cut where it is long, and without control characters: files may hold anything.
@@ -159,7 +144,7 @@ std::vector<double> numbers_of(const Value& where, const Allowed& first_three,
   std::vector<double> values;
   std::string_view rest = where.text();
   while (!rest.empty()) {
-    const size_t length = std::min(rest.find_first_of(kSpace), rest.size());
+    const size_t length = std::min(rest.find_first_of(" \t\r\n\f\v"), rest.size());
     values.push_back(
         number_of(where, rest.substr(0, length), values.size() < 3 ? first_three : others));
     rest = trimmed(rest.substr(length));

@@ -157,14 +157,14 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
           std::from_chars(size.data(), size.data() + size.size(), dimension.size);
       if (error != std::errc() || end != size.data() + size.size())
         tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
-                    "' is no whole number");
+                    "' is not a whole number");
     } else {
       const auto& fields = parsed.schema.fields;
       const auto counter = std::find_if(fields.begin(), fields.end(),
                                         [&](const Field& f) { return f.name == size; });
       if (counter == fields.end() || !counts(*counter))
         tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
-                    "' is no field before it that is one int8_t, int16_t, int32_t or int64_t");
+                    "' is not a field before it that is one int8_t, int16_t, int32_t or int64_t");
       dimension.counted_by = FieldIndex(counter - fields.begin());
     }
     parsed.hash = mix(mix(parsed.hash, static_cast<uint8_t>(fixed ? 0 : 1)), size);
@@ -180,7 +180,7 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
 
 void parse_file(std::string_view text, const std::string& file, std::deque<Parsed>& all) {
   if (text.find('\0') != std::string_view::npos)
-    throw InputError({file}, "contains a zero byte: it is no text");
+    throw InputError({file}, "contains a zero byte: it is not a text");
   Tokens tokens(text, file);
   const size_t before = all.size();
   for (std::string_view token = tokens.next(); !token.empty(); token = tokens.next()) {

@@ -20,7 +20,8 @@ Whole whole(double value) {
   constexpr Whole kHalf = std::numeric_limits<Whole>::max() / 2 + 1;
   constexpr double kEnd = 2.0 * static_cast<double>(kHalf);
   if (!(value > kBegin - 1.0 || value == kBegin) || !(value < kEnd)) {
-    throw std::out_of_range(std::to_string(value) + " is no whole number that can be counted with");
+    throw std::out_of_range(std::to_string(value) +
+                            " is not a whole number that can be counted with");
   }
   return static_cast<Whole>(value);
 }

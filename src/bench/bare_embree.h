@@ -8,7 +8,7 @@
 
 #include "scene/rays/ray_embree.h"
 #include "scene/rays/ray_scene.h"
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::bench {
 

@@ -114,7 +114,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   run::Run server(world, std::move(options), sink);
   const std::vector<uint8_t> circle = circle_command();
   for (int robot = 0; robot < task.robots; ++robot)
-    server.receive(fmt::format("r{}/move", robot), circle);
+    server.on_message(fmt::format("r{}/move", robot), circle);
   const double load_s = seconds_since(load_begin);
 
   const double cpu_begin = cpu_seconds();

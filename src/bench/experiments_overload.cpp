@@ -66,12 +66,12 @@ Run run_world(std::function<void(const std::string&)> before_batch) {
   command.radius = 1.2;
   std::vector<uint8_t> bytes(static_cast<size_t>(command.getEncodedSize()));
   command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  simulation.inbox().receive("p3at/move", bytes.data(), bytes.size());
+  simulation.inbox().put("p3at/move", bytes.data(), bytes.size());
 
   Run run;
   simulation.start(pacer);
   for (bool last = false; !last;) {
-    const engine::Batch* batch = simulation.take();
+    const engine::Batch* batch = simulation.next_batch();
     if (!batch) {
       finished.wait();
       continue;

@@ -13,8 +13,8 @@
 #include "robot/robots.h"
 #include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
-#include "scene/rays/ray_scene.h"
 #include "scene/pictures/render_scene.h"
+#include "scene/rays/ray_scene.h"
 #include "world/load.h"
 #include "world/mesh/codecs.h"
 

@@ -188,7 +188,7 @@ void LcmBus::ignore_own() {
   const auto until = std::chrono::steady_clock::now() + kSelfTestTime;
   while (!own && std::chrono::steady_clock::now() < until) {
     pollfd waiting{multicast_->file(), POLLIN, 0};
-    if (::poll(&waiting, 1, 1) > 0) multicast_->take(look);
+    if (::poll(&waiting, 1, 1) > 0) multicast_->receive(look);
   }
   if (own) multicast_->ignore(multicast_->sender());
 }
@@ -267,7 +267,7 @@ bool LcmBus::take_from_stream() {
     deliver(channel, data, size);
   };
   if (!stream_->is_over()) {
-    stream_->take(0, take);
+    stream_->receive(0, take);
     return !stream_->is_over();
   }
   try {
@@ -281,7 +281,7 @@ bool LcmBus::take_from_stream() {
   subscribe_missing();
   const auto until = std::chrono::steady_clock::now() + kFirstPause;  // some close at once
   while (!stream_->is_over() && std::chrono::steady_clock::now() < until) {
-    if (stream_->take(static_cast<int>(kFirstPause.count()), take)) break;
+    if (stream_->receive(static_cast<int>(kFirstPause.count()), take)) break;
   }
   return !stream_->is_over();
 }
@@ -296,7 +296,7 @@ bool LcmBus::handle() {
   const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
     deliver(channel, data, size);
   };
-  for (int i = 0; i < kTakenTogether && multicast_->take(take); ++i) {
+  for (int i = 0; i < kTakenTogether && multicast_->receive(take); ++i) {
   }
   return true;
 }

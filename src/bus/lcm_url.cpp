@@ -114,7 +114,7 @@ LcmUrl parse_url(const std::string& text, const std::string& given_by) {
   }
   std::string rest = text.substr(scheme_end + 3);
   if (url.scheme == "unix") {
-    if (rest.empty() || rest[0] != '/') refuse(given, "'" + rest + "' is no absolute path");
+    if (rest.empty() || rest[0] != '/') refuse(given, "'" + rest + "' is not an absolute path");
     url.host = rest;
     return url;
   }
@@ -128,21 +128,21 @@ LcmUrl parse_url(const std::string& text, const std::string& given_by) {
     refuse(given, "LCM has no IPv6: '" + rest + "' is not allowed; give a name or an IPv4 address");
   if (const size_t colon = rest.find(':'); colon != std::string::npos) {
     const std::string digits = rest.substr(colon + 1);
-    if (!is_number(digits, 1, UINT16_MAX)) refuse(given, "'" + digits + "' is no port");
+    if (!is_number(digits, 1, UINT16_MAX)) refuse(given, "'" + digits + "' is not a port");
     url.port = static_cast<uint16_t>(std::stoi(digits));
     rest.resize(colon);
   }
   if (url.scheme == "tcpq") {
     if (url.port == 0) url.port = kDefaultTcpPort;
     url.host = rest.empty() ? "127.0.0.1" : resolved(rest);
-    if (url.host.empty()) refuse(given, "'" + rest + "' is no host that this machine knows");
+    if (url.host.empty()) refuse(given, "'" + rest + "' is not a host that this machine knows");
     return url;
   }
   url.host = rest.empty() ? "239.255.76.67" : rest;
   if (url.port == 0) url.port = 7667;
   in_addr group{};
   if (::inet_pton(AF_INET, url.host.c_str(), &group) != 1 || !IN_MULTICAST(ntohl(group.s_addr))) {
-    refuse(given, "'" + url.host + "' is no multicast group (224.0.0.0 to 239.255.255.255)");
+    refuse(given, "'" + url.host + "' is not a multicast group (224.0.0.0 to 239.255.255.255)");
   }
   check_options(given, url.options);
   if (url.option("ttl", "").empty()) url.options += (url.options.empty() ? "ttl=0" : "&ttl=0");

@@ -60,7 +60,7 @@ MulticastReceiver::MulticastReceiver(const std::string& group, uint16_t port, in
         "IP_ADD_MEMBERSHIP");
 }
 
-bool MulticastReceiver::take(const Handler& handler) {
+bool MulticastReceiver::receive(const Handler& handler) {
   sockaddr_in from{};
   socklen_t from_size = sizeof from;
   const ssize_t got = ::recvfrom(socket_.get(), datagram_.data(), datagram_.size(), MSG_DONTWAIT,

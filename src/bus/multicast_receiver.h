@@ -33,7 +33,7 @@ class MulticastReceiver {
   // std::system_error.
   MulticastReceiver(const std::string& group, uint16_t port, int buffer);
 
-  int file() const { return socket_.get(); }  // readable when take() has something
+  int file() const { return socket_.get(); }  // readable when receive() has something
 
   struct Sender {
     uint32_t address = 0;  // IPv4 and port, in the host's byte order
@@ -43,7 +43,7 @@ class MulticastReceiver {
 
   // Takes one datagram, and calls the handler when it completes a message. False: there is none.
   // Datagrams that are not LCM's are ignored.
-  bool take(const Handler& handler);
+  bool receive(const Handler& handler);
   // The same for a datagram that came in another way.
   void read(const uint8_t* bytes, size_t size, Sender sender, const Handler& handler);
 

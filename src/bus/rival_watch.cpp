@@ -67,7 +67,7 @@ void RivalWatch::heard(const uint8_t* data, size_t size) {
   say_("another server is on this channel: run " + std::to_string(id) + ", world " +
        in_one_line(for_terminal(shortened(info.world, 100))) + "; this one is run " +
        std::to_string(run_id_) +
-       ". Their messages mix: give one of them another --lcm port (this is said once)");
+       ". Their messages mix: start one of them with another --lcm port (shown once)");
 }
 
 }  // namespace ruedo::bus

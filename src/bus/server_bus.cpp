@@ -86,7 +86,7 @@ ServerBus unwatched_bus(const std::string& text, const std::string& world) {
     made.url = parse_url("tcpq://");
     made.announce = true;
     made.note =
-        "no multicast route here, so this server speaks LCM over TCP (`ruedo doctor` tells more)";
+        "no multicast route here, so this server speaks LCM over TCP (`ruedo doctor` explains)";
   } else {
     made.url = parse_url(text);
   }

@@ -64,7 +64,7 @@ bool StreamConnection::unsubscribe(std::string_view name) {
   return send(frame_);
 }
 
-bool StreamConnection::take(int timeout_ms, const Handler& handler) {
+bool StreamConnection::receive(int timeout_ms, const Handler& handler) {
   if (over_) return false;
   pollfd waiting{socket_.get(), POLLIN, 0};
   if (timeout_ms != 0 && ::poll(&waiting, 1, timeout_ms) <= 0) return false;

@@ -1,7 +1,7 @@
 // A client's end of a stream of tcpq's frames, over TCP or a Unix-domain socket: sends, and parses
 // what was received (see tcpq_wire.h).
 //
-// Safe to publish and subscribe from any thread; take() from one at a time.
+// Safe to publish and subscribe from any thread; receive() from one at a time.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ class StreamConnection {
 
   // Waits at most so long (ms) for something, and calls the handler for each whole message that
   // came. False when there was nothing.
-  bool take(int timeout_ms, const Handler& handler);
+  bool receive(int timeout_ms, const Handler& handler);
   bool is_over() const { return over_; }
   int file() const { return socket_.get(); }
 

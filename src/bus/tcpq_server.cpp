@@ -141,7 +141,7 @@ void TcpqServer::serve() {
       } else {
         Client& client = *static_cast<Client*>(events[i].data.ptr);
         if (events[i].events & EPOLLOUT) send(client);
-        if (!client.gone && events[i].events & (EPOLLIN | EPOLLHUP | EPOLLERR)) receive(client);
+        if (!client.gone && events[i].events & (EPOLLIN | EPOLLHUP | EPOLLERR)) read_from(client);
       }
     }
     if (newcomers) accept_all();
@@ -238,7 +238,7 @@ TcpqServer::Client* TcpqServer::of_largest_share(const FileHandle& newcomer) {
   return client == clients_.end() ? nullptr : &*client;
 }
 
-void TcpqServer::receive(Client& client) {
+void TcpqServer::read_from(Client& client) {
   uint8_t chunk[kChunk];
   for (int i = 0; i < kMostChunks && !client.gone; ++i) {
     const ssize_t size = ::recv(client.socket.get(), chunk, sizeof chunk, 0);
@@ -252,7 +252,8 @@ void TcpqServer::receive(Client& client) {
     client.reader.add({chunk, static_cast<size_t>(size)});
     tcpq::Frame frame;
     tcpq::Reader::Result result;
-    while ((result = client.reader.next(frame)) == tcpq::Reader::Result::frame) take(client, frame);
+    while ((result = client.reader.next(frame)) == tcpq::Reader::Result::frame)
+      handle(client, frame);
     client.reader.tidy();
     received_ += client.reader.held() - held;
     if (result == tcpq::Reader::Result::broken)
@@ -267,7 +268,7 @@ void TcpqServer::receive(Client& client) {
   set(client.socket.get(), IPPROTO_TCP, TCP_QUICKACK);  // the kernel falls back to delayed ones
 }
 
-void TcpqServer::take(Client& client, const tcpq::Frame& frame) {
+void TcpqServer::handle(Client& client, const tcpq::Frame& frame) {
   client.spoke = true;
   const bool had_none = client.filter.empty();
   if (frame.kind == tcpq::Frame::Kind::publish) {
@@ -373,8 +374,8 @@ bool TcpqServer::is_replaced(Client& client, const MessageRing::Message& message
   ++replaced_;
   if (!std::exchange(client.told_replaced, true)) {
     spdlog::warn(
-        "{}: a client takes its messages more slowly than they come, and gets the newest of each "
-        "sensor alone (this is said once)",
+        "{}: a client reads more slowly than messages arrive; it gets only the newest message of "
+        "each sensor (shown once)",
         url_.str());
   }
   return true;

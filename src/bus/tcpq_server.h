@@ -90,8 +90,8 @@ class TcpqServer : public Bus {
   void accept_all();
   bool make_place(const FileHandle& newcomer);
   Client* of_largest_share(const FileHandle& newcomer);
-  void receive(Client& client);
-  void take(Client& client, const tcpq::Frame& frame);
+  void read_from(Client& client);
+  void handle(Client& client, const tcpq::Frame& frame);
   void change(Client& client, const tcpq::Frame& frame);  // of its subscriptions
   bool is_listened_to(const std::string& channel);
   void drop(Client& client, const std::string& why);

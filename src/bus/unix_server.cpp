@@ -192,7 +192,7 @@ void UnixServer::keep(Client& client, const Frame& frame) {
     ++failed_;
     if (!std::exchange(client.told, true)) {
       spdlog::warn(
-          "{}: a client takes nothing, and loses messages: {} MiB wait for it (this is said once)",
+          "{}: a client does not read, and loses messages: {} MiB wait for it (shown once)",
           url_.str(), client.behind() >> 20);
     }
     return;
@@ -243,8 +243,8 @@ void UnixServer::take_out_replaced(Client& client) {
   client.most_old = std::max(kMostOld, 2 * client.rest.size());
   if (!std::exchange(client.told_replaced, true)) {
     spdlog::warn(
-        "{}: a client takes its messages more slowly than they come, and gets the newest of each "
-        "sensor alone (this is said once)",
+        "{}: a client reads more slowly than messages arrive; it gets only the newest message of "
+        "each sensor (shown once)",
         url_.str());
   }
 }
@@ -291,7 +291,7 @@ void UnixServer::serve() {
         } else if (events[i].data.ptr != &listener_) {
           Client& client = *static_cast<Client*>(events[i].data.ptr);
           if (events[i].events & EPOLLOUT) send_rest(client);
-          if (!client.gone && events[i].events & (EPOLLIN | EPOLLHUP | EPOLLERR)) receive(client);
+          if (!client.gone && events[i].events & (EPOLLIN | EPOLLHUP | EPOLLERR)) read_from(client);
         }
       }
       sweep();
@@ -349,7 +349,7 @@ void UnixServer::watch_newcomers(bool wanted) {
     ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
 }
 
-void UnixServer::receive(Client& client) {
+void UnixServer::read_from(Client& client) {
   uint8_t chunk[kChunk];
   const ssize_t size = ::recv(client.socket.get(), chunk, sizeof chunk, MSG_DONTWAIT);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
@@ -361,7 +361,7 @@ void UnixServer::receive(Client& client) {
   client.reader.add({chunk, static_cast<size_t>(size)});
   tcpq::Frame frame;
   tcpq::Reader::Result result;
-  while ((result = client.reader.next(frame)) == tcpq::Reader::Result::frame) take(client, frame);
+  while ((result = client.reader.next(frame)) == tcpq::Reader::Result::frame) handle(client, frame);
   client.reader.tidy();
   if (result == tcpq::Reader::Result::broken) {
     ++refused_;
@@ -373,7 +373,7 @@ void UnixServer::receive(Client& client) {
   }
 }
 
-void UnixServer::take(Client& client, const tcpq::Frame& frame) {
+void UnixServer::handle(Client& client, const tcpq::Frame& frame) {
   switch (frame.kind) {
     case tcpq::Frame::Kind::subscribe:
       send_frames();  // what was published before is not for it

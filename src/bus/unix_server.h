@@ -85,8 +85,8 @@ class UnixServer : public Bus {
   void serve();
   void accept_all();
   void watch_newcomers(bool wanted);
-  void receive(Client& client);
-  void take(Client& client, const tcpq::Frame& frame);
+  void read_from(Client& client);
+  void handle(Client& client, const tcpq::Frame& frame);
   void add(std::string_view channel, std::span<const uint8_t> data);
   void send_frames();
   void send(Client& client);

@@ -48,7 +48,7 @@ void clear(const std::string& path) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
+    throw EnvironmentError("unix://" + path + " is a file, not a socket: choose another path");
   if (::unlink(path.c_str()) != 0 && errno != ENOENT) cannot_serve(path);
 }
 

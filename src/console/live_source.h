@@ -15,7 +15,7 @@ namespace ruedo::console {
 struct LiveHost {
   std::function<std::shared_ptr<const world::WorldModel>()> world;
   std::function<std::string(const std::string& name)> model_text;
-  std::function<void(const std::string& channel, std::span<const uint8_t> message)> receive;
+  std::function<void(const std::string& channel, std::span<const uint8_t> message)> on_message;
   std::function<uint64_t()> lost;  // messages that the bus could not send
   std::string save_name;           // of the file written by SAVE
 };
@@ -60,7 +60,7 @@ class LiveSource : public Source {
   }
   bool command(const std::string& channel, std::span<const uint8_t> message) override {
     if (!tap_.takes(channel)) return false;
-    host_.receive(channel, message);
+    host_.on_message(channel, message);
     return true;
   }
   std::shared_ptr<const world::WorldModel> world(size_t scene) override {

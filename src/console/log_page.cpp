@@ -15,6 +15,7 @@
 
 #include "base/channel_names.h"
 #include "base/json.h"
+#include "base/text.h"
 #include "base/utf8.h"
 #include "console/assets.h"
 #include "console/board.h"
@@ -289,23 +290,10 @@ class Writer {
     text("<script type=\"application/json\" id=\"log\">");
     text(head);
     text("</script>\n<script type=\"text/plain\" id=\"bytes\">");
-    text(base64());
+    text(base64(bytes_));
     text("</script>\n</body>\n</html>\n");
     file.keep();
     return written;
-  }
-
-  std::string base64() const {
-    constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string text;
-    text.reserve(bytes_.size() / 3 * 4 + 4);
-    for (size_t i = 0; i < bytes_.size(); i += 3) {
-      const size_t count = std::min<size_t>(3, bytes_.size() - i);
-      uint32_t three = 0;
-      for (size_t k = 0; k < 3; ++k) three = three << 8 | (k < count ? bytes_[i + k] : 0u);
-      for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[three >> (18 - 6 * k) & 63] : '=';
-    }
-    return text;
   }
 
   log::Index index_;

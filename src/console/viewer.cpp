@@ -47,7 +47,7 @@ void Viewer::pump() {
   if (look_) look_->pump(own_board_);
 }
 
-bool Viewer::receive(std::span<const uint8_t> message) {
+bool Viewer::on_message(std::span<const uint8_t> message) {
   if (message.empty()) return false;
   const std::span<const uint8_t> rest = message.subspan(1);
   switch (static_cast<Operation>(message[0])) {

@@ -53,7 +53,7 @@ class Viewer : public http::Connection {
   explicit Viewer(Stage& stage);
   ~Viewer() override;
 
-  bool receive(std::span<const uint8_t> message) override;
+  bool on_message(std::span<const uint8_t> message) override;
   bool next(std::vector<uint8_t>& message, bool& text) override;
 
   // For a log: advances its view.

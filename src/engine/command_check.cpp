@@ -10,7 +10,7 @@
 #include "base/utf8.h"
 #include "robot/joint_control.h"
 #include "ruedo/joint_command_t.hpp"
-#include "world/model/drive.h"
+#include "world/drives/drive.h"
 
 namespace ruedo::engine {
 namespace {

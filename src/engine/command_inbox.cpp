@@ -186,7 +186,7 @@ void CommandInbox::reset_time() {
   for (Slots& slots : waits_.slots) slots.primitives.clear();
 }
 
-void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {
+void CommandInbox::put(const std::string& channel, const uint8_t* data, size_t size) {
   const auto found = by_channel_.find(channel);
   if (found == by_channel_.end()) return;
   if (size > kMaxMessageSize) return refuse(channel, "more than 64 kB");

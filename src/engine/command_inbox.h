@@ -45,7 +45,7 @@ class CommandInbox {
 
   // Checks a message and stores it; a faulty one is counted, and logged at most once a second. A
   // motion primitive with a number is taken once, however often it is sent. Any thread.
-  void receive(const std::string& channel, const uint8_t* data, size_t size);
+  void put(const std::string& channel, const uint8_t* data, size_t size);
 
   // Requests a reset of a robot's odometry, with the request's body for the log. Any thread.
   void reset_odometry(RobotIndex robot, const std::vector<uint8_t>& body);
@@ -75,7 +75,7 @@ class CommandInbox {
   void remove(RobotIndex robot);
   void reset_time();  // steps count from 0: scheduled commands are dropped
   // Takes the waiting commands of another copy of the world, while nothing is received or applied.
-  void take(const CommandInbox& other) { waits_ = other.waits_; }
+  void copy_from(const CommandInbox& other) { waits_ = other.waits_; }
   // What waits is not part of a written state.
   void exchange(StateArchive& archive) { archive(waits_.next_step); }
 

@@ -114,7 +114,7 @@ struct Engine::Copy {
 
   void make_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults = nullptr);
   void keep_newest(const Batch& batch);
-  void take(const Copy& other);
+  void copy_from(const Copy& other);
 };
 
 class SavedWorld {
@@ -469,8 +469,9 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
           decode_checked(message.data(), message.size(), markers) == DecodeFault::none) {
         throw InputError({}, channel + ": " + check_markers(markers));
       }
-      throw InputError({}, "that is no message for " + channel);
-    case CommandInbox::Scheduled::late: throw InputError({}, "that is no message for " + channel);
+      throw InputError({}, "the message does not decode as the type of " + channel);
+    case CommandInbox::Scheduled::late:
+      throw InputError({}, "the message does not decode as the type of " + channel);
   }
 }
 
@@ -524,8 +525,8 @@ void Engine::reset_one(const Reset& reset, std::unique_ptr<Copy> made) {
   compute(index, 1);
 }
 
-void Engine::Copy::take(const Copy& other) {
-  world->take(*other.world);
+void Engine::Copy::copy_from(const Copy& other) {
+  world->copy_from(*other.world);
   step = other.step;
   driven = false;
   newest = other.newest;
@@ -540,7 +541,7 @@ std::shared_ptr<const SavedWorld> Engine::save(int world) {
   auto saved = std::make_shared<SavedWorld>();
   saved->engine = identity_;
   saved->copy = make_another(copy);
-  saved->copy->take(copy);
+  saved->copy->copy_from(copy);
   const auto* touching = reinterpret_cast<const int32_t*>(touching_->values.data());
   saved->touching.assign(touching + index * driven_.size(),
                          touching + (index + 1) * driven_.size());
@@ -567,7 +568,7 @@ void Engine::restore_one(const SavedWorld& saved, size_t world) {
     copies_[world] = make_another(from);
   Copy& copy = *copies_[world];
   copy.sound = false;
-  copy.take(from);
+  copy.copy_from(from);
   std::copy(saved.touching.begin(), saved.touching.end(),
             reinterpret_cast<int32_t*>(touching_->values.data()) + world * driven_.size());
   copy.make_scenes(read_.get());

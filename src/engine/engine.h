@@ -19,7 +19,7 @@
 
 #include "engine/field_reader.h"
 #include "engine/world.h"
-#include "world/edit/randomization.h"
+#include "world/randomization.h"
 
 namespace ruedo::engine {
 

@@ -59,8 +59,8 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field) : schem
     type_ = one.primitive;
   }
   if (type_ == Primitive::none)
-    throw InputError(
-        {}, "'" + field + "' is no field of numbers in " + schema.name + "; there are " + readable);
+    throw InputError({}, "'" + field + "' is not a field of numbers in " + schema.name +
+                             "; there are " + readable);
 }
 
 size_t FieldReader::value_size() const { return wire_size(type_); }

@@ -31,7 +31,7 @@ std::string check_place(const marker_t& marker) {
   }
   double norm = 0.0;
   for (const double value : marker.orientation) norm += value * value;
-  if (!is_within(norm, 0.9, 1.1)) return "orientation is no unit quaternion w, x, y, z";
+  if (!is_within(norm, 0.9, 1.1)) return "orientation is not a unit quaternion w, x, y, z";
   for (const float value : marker.color) {
     if (!is_within(value, 0.0, 1.0)) return fmt::format("color {} is not from 0 to 1", value);
   }
@@ -48,7 +48,7 @@ std::string check_place(const marker_t& marker) {
 
 std::string check_map(const marker_t& marker) {
   if (marker.columns < 1 || marker.ncells < 1 || marker.ncells % marker.columns != 0)
-    return fmt::format("{} cells are no rows of {} columns", marker.ncells, marker.columns);
+    return fmt::format("{} cells do not fill rows of {} columns", marker.ncells, marker.columns);
   const auto wrong = std::find_if(marker.cells.begin(), marker.cells.end(), [](uint8_t cell) {
     return cell > kMostCell && cell != kUnknown;
   });
@@ -60,7 +60,7 @@ std::string check_map(const marker_t& marker) {
 std::string check_kind(const marker_t& marker) {
   switch (marker.kind) {
     case marker_t::LINES:
-      return marker.n % 2 == 0 ? "" : fmt::format("{} points are no pairs", marker.n);
+      return marker.n % 2 == 0 ? "" : fmt::format("{} points do not make pairs", marker.n);
     case marker_t::PATH:
     case marker_t::POINTS: return "";
     case marker_t::TEXT:

@@ -100,12 +100,12 @@ void Module::reset_time(SimTime us) {
 }
 
 // Scenes show the step looked at last, and depend on nothing earlier.
-const Device* Module::take(const Module& other) {
+const Device* Module::copy_from(const Module& other) {
   for (size_t k = 0; k < slots_.size(); ++k) {
     Device& device = setup_.devices[k];
     const Device& there = other.setup_.devices[k];
     const bool keeps_nothing = setup_.wants_renderer && !slots_[k].observes;
-    if (!keeps_nothing && !device.sensor->take(*there.sensor)) return &device;
+    if (!keeps_nothing && !device.sensor->copy_from(*there.sensor)) return &device;
     device.first_step = there.first_step;
     device.random = there.random;
   }

@@ -16,8 +16,8 @@
 #include "engine/batch.h"
 #include "engine/faults/sensor_faults.h"
 #include "ruedo/sensor.h"
-#include "scene/rays/ray_scene.h"
 #include "scene/pictures/render_scene.h"
+#include "scene/rays/ray_scene.h"
 
 namespace ruedo::engine {
 
@@ -134,7 +134,7 @@ class Module {
 
   // Between two batches: takes the devices, clocks and faults of another copy of the world. Returns
   // a device whose sensor does not support it, or null.
-  const Device* take(const Module& other);
+  const Device* copy_from(const Module& other);
   // The same, in bytes, where no device was ever faulty. Returns likewise.
   const Device* exchange(StateArchive& archive);
 

@@ -130,12 +130,12 @@ void Simulation::remove_model(InstanceIndex instance, Channels& channels) {
 }
 
 void Simulation::save(World& copy) const {
-  copy.take(world_);
+  copy.copy_from(world_);
   copy.inbox().clear();
 }
 
 void Simulation::restore(const World& copy, int epoch) {
-  world_.take(copy);
+  world_.copy_from(copy);
   world_.set_epoch(epoch);
 }
 
@@ -262,7 +262,7 @@ void Simulation::leave_off() {
   pace_->stop();
 }
 
-const Batch* Simulation::take() {
+const Batch* Simulation::next_batch() {
   const Batch* batch = advance();
   if (batch && batch->failed) throw std::runtime_error(batch->failure);
   return batch;

@@ -39,8 +39,8 @@ class Simulation {
  public:
   static constexpr int kBatches = 4;
 
-  // Creates everything but threads, and announces channels. finished: set whenever take() may have
-  // something. Throws InputError.
+  // Creates everything but threads, and announces channels. finished: set whenever next_batch() may
+  // have something. Throws InputError.
   Simulation(std::shared_ptr<const world::WorldModel> world, const SimulationOptions& options,
              Channels& channels, Findings& findings, Wakeup& finished);
   ~Simulation();  // stops, and waits for all threads
@@ -59,13 +59,13 @@ class Simulation {
 
   // For the publisher: the next finished batch in order, or null if there is none yet. The batch
   // stays valid until the next call that returns one. Throws std::runtime_error if a module failed.
-  const Batch* take();
+  const Batch* next_batch();
   // Whether the last batch was taken, and why the run ended early; "": it did not.
   bool over() const { return last_taken_; }
   const std::string& end() const { return end_; }
 
-  // What is being computed if take() has nothing, in words: a sensor, or a step; "": nothing. For
-  // the publisher.
+  // What is being computed if next_batch() has nothing, in words: a sensor, or a step; "": nothing.
+  // For the publisher.
   std::string at_work() const;
 
   // Ends the run here: what has not been taken yet is not finished, so that the last batch comes

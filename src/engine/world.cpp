@@ -57,7 +57,7 @@ World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& 
 std::shared_ptr<physics::PhysicsWorld> World::physics_of(World* ended) const {
   if (!ended || ended->plan_ != plan_ || !ended->sound_)
     return std::make_shared<physics::PhysicsWorld>(model_, layout_);
-  ended->physics_->take(plan_->beginning());
+  ended->physics_->copy_from(plan_->beginning());
   return ended->physics_;
 }
 
@@ -76,19 +76,19 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   sound_ = true;
 }
 
-void World::take(const World& other) {
+void World::copy_from(const World& other) {
   options_.seed = other.options_.seed;
-  inbox_.take(other.inbox_);
+  inbox_.copy_from(other.inbox_);
   faults_ = other.faults_;
-  physics_->take(*other.physics_);
-  robots_->take(*other.robots_);
+  physics_->copy_from(*other.physics_);
+  robots_->copy_from(*other.robots_);
   for (size_t m = 0; m < modules_.size(); ++m) {
-    const Device* uncopied = modules_[m]->take(*other.modules_[m]);
+    const Device* uncopied = modules_[m]->copy_from(*other.modules_[m]);
     if (!uncopied) continue;
     const std::string robot =
         uncopied->robot.valid() ? model_.models[layout_.robots[uncopied->robot].instance].name : "";
     throw InputError({}, "the device '" + robot + "/" + uncopied->name +
-                             "' is a plugin's that cannot be copied: it lacks Sensor::take()");
+                             "' is a plugin's that cannot be copied: it lacks Sensor::copy_from()");
   }
 }
 

@@ -69,7 +69,7 @@ class World {
   // what follows equals what follows there, byte for byte. Both stand between two steps, and no
   // model came or went. Throws InputError for a plugin's device or drive that cannot be copied; it
   // may be half done then.
-  void take(const World& other);
+  void copy_from(const World& other);
   // Writes that state, or reads it into another copy; commands that wait are not in it. Throws
   // ArchiveError where it cannot be written: a device or drive is a plugin's, or something is or
   // was faulty.

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "engine/world_state.h"
-#include "world/model/drive.h"
+#include "world/drives/drive.h"
 
 namespace ruedo::engine {
 namespace {

@@ -83,7 +83,7 @@ struct WebServer::Impl {
     size_t held = 0;  // bytes that were made for it alone, and are not known to be sent
     Time held_since;
 
-    void hold(size_t bytes) {
+    void reserve(size_t bytes) {
       held = bytes;
       held_since = std::chrono::steady_clock::now();
     }
@@ -156,7 +156,7 @@ struct WebServer::Impl {
   static int completed(lws* wsi, Peer& peer);
   int request(lws* wsi, Peer& peer, std::string_view path);
   int send_chunk(lws* wsi, Peer& peer);
-  static int receive(lws* wsi, Peer& peer, const uint8_t* data, size_t size);
+  static int read_from(lws* wsi, Peer& peer, const uint8_t* data, size_t size);
   int write(lws* wsi, Peer& peer);
 };
 
@@ -196,7 +196,7 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
       lws_return_http_status(wsi, HTTP_STATUS_FORBIDDEN, nullptr);
       return 1;
     case LWS_CALLBACK_ESTABLISHED: return establish(wsi, peer);
-    case LWS_CALLBACK_RECEIVE: return receive(wsi, peer, static_cast<const uint8_t*>(in), length);
+    case LWS_CALLBACK_RECEIVE: return read_from(wsi, peer, static_cast<const uint8_t*>(in), length);
     default: return write(wsi, peer);
   }
 }
@@ -308,7 +308,7 @@ int WebServer::Impl::request(lws* wsi, Peer& peer, std::string_view path) {
   if (response.body.use_count() == 1) {
     if (held() > kMostHeld)
       return respond(wsi, peer, text(503, "Too much is sent now: ask again.\n"));
-    peer.hold(response.body->size());
+    peer.reserve(response.body->size());
   }
   return respond(wsi, peer, std::move(response));
 }
@@ -365,13 +365,13 @@ int WebServer::Impl::send_chunk(lws* wsi, Peer& peer) {
   return 0;
 }
 
-int WebServer::Impl::receive(lws* wsi, Peer& peer, const uint8_t* data, size_t size) {
+int WebServer::Impl::read_from(lws* wsi, Peer& peer, const uint8_t* data, size_t size) {
   if (!peer.connection) return -1;
   if (lws_is_first_fragment(wsi) != 0) peer.incoming.clear();
   if (peer.incoming.size() + size > kMostMessage) return -1;
   peer.incoming.insert(peer.incoming.end(), data, data + size);
   if (lws_is_final_fragment(wsi) == 0 || lws_remaining_packet_payload(wsi) > 0) return 0;
-  if (!peer.connection->receive(peer.incoming)) return -1;
+  if (!peer.connection->on_message(peer.incoming)) return -1;
   peer.incoming.clear();
   lws_callback_on_writable(wsi);
   return 0;
@@ -387,7 +387,7 @@ int WebServer::Impl::write(lws* wsi, Peer& peer) {
   message.assign(LWS_PRE, 0);
   bool text = false;
   if (!peer.connection->next(message, text)) return 0;
-  peer.hold(message.size());
+  peer.reserve(message.size());
   if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE,
                 text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0)
     return -1;

@@ -30,7 +30,7 @@ class Connection {
  public:
   virtual ~Connection() = default;
   // Handles a whole message; false closes the connection.
-  virtual bool receive(std::span<const uint8_t> message) = 0;
+  virtual bool on_message(std::span<const uint8_t> message) = 0;
   // Puts the next message into `message`; false if there is none now.
   virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
 };

@@ -72,7 +72,7 @@ DiffRule DiffRule::tolerance(std::string_view text) {
       rule.angle = value;
     else
       throw InputError({}, "tolerance \"" + std::string(text) + "\": \"" + std::string(kind) +
-                               "\" is none of abs, rel, angle");
+                               "\" is not one of abs, rel, angle");
   }
   return rule;
 }

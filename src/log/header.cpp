@@ -19,7 +19,7 @@
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "system/late_library.h"
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 namespace ruedo::log {
 namespace {

@@ -81,7 +81,7 @@ class McapFile {
 
   void read() {
     if (bytes(kMagicSize) != std::vector<uint8_t>(kMagic, kMagic + kMagicSize))
-      throw InputError({path_}, "is no MCAP file");
+      throw InputError({path_}, "is not an MCAP file");
     while (true) {
       begin_ = offset_;
       const std::vector<uint8_t> head = bytes(kRecordHead);

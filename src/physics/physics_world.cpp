@@ -12,7 +12,7 @@ PhysicsWorld::PhysicsWorld(const world::WorldModel& world, const world::BodyLayo
 PhysicsWorld::~PhysicsWorld() = default;
 
 void PhysicsWorld::step() { impl_->step(); }
-void PhysicsWorld::take(const PhysicsWorld& other) { impl_->take(*other.impl_); }
+void PhysicsWorld::copy_from(const PhysicsWorld& other) { impl_->copy_from(*other.impl_); }
 void PhysicsWorld::exchange(StateArchive& archive) { impl_->exchange(archive); }
 const Pose& PhysicsWorld::pose(BodyIndex body) const { return impl_->poses_[body]; }
 const Twist& PhysicsWorld::twist(BodyIndex body) const { return impl_->twists_[body]; }

@@ -115,7 +115,7 @@ class PhysicsWorld {
   // Between two steps: takes the state of another copy of the same world, with the same WorldModel
   // and BodyLayout; what follows is equal bit for bit. Neither may have had an instance added or
   // removed. Throws std::logic_error if Bullet's state cannot be copied.
-  void take(const PhysicsWorld& other);
+  void copy_from(const PhysicsWorld& other);
   // The same, in bytes. Throws ArchiveError if Bullet's state cannot be written, or read.
   void exchange(StateArchive& archive);
 

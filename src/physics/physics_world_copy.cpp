@@ -8,7 +8,7 @@
 
 namespace ruedo::physics {
 
-void PhysicsWorld::Impl::take(const Impl& other) {
+void PhysicsWorld::Impl::copy_from(const Impl& other) {
   take_ties(other);
   poses_ = other.poses_;
   twists_ = other.twists_;
@@ -20,10 +20,10 @@ void PhysicsWorld::Impl::take(const Impl& other) {
   contacts_ = other.contacts_;
   tied_ = other.tied_;
   wind_ = other.wind_;
-  for (const JointIndex i : joints_.indices()) joints_[i].take(other.joints_[i]);
-  for (const WheelJointIndex i : wheels_.indices()) wheels_[i].take(other.wheels_[i]);
+  for (const JointIndex i : joints_.indices()) joints_[i].copy_from(other.joints_[i]);
+  for (const WheelJointIndex i : wheels_.indices()) wheels_[i].copy_from(other.wheels_[i]);
   for (const BodyIndex i : motions_.indices()) take_body(i, other);
-  broadphase_.take(other.broadphase_, &dispatcher_);
+  broadphase_.copy_from(other.broadphase_, &dispatcher_);
 
   std::map<const btTypedConstraint*, btTypedConstraint*> here;  // only looked up, never iterated
   const auto add = [&](const auto& there, auto& joints) {
@@ -34,7 +34,7 @@ void PhysicsWorld::Impl::take(const Impl& other) {
   add(other.wheels_, wheels_);
   for (const TieIndex i : ties_.indices())
     here[other.ties_[i].constraint.get()] = ties_[i].constraint.get();
-  dynamics_.take(other.dynamics_, [&](btTypedConstraint* there) { return here.at(there); });
+  dynamics_.copy_from(other.dynamics_, [&](btTypedConstraint* there) { return here.at(there); });
 
   for (const BodyIndex i : motions_.indices()) {  // contacts are copied between awake objects
     const btRigidBody& there = *other.rigid_.bodies[i].bullet;

@@ -161,7 +161,7 @@ PhysicsWorld::Impl::~Impl() {
     }
   }
   for (Tie& each : ties_) dynamics_.removeConstraint(each.constraint.get());
-  dynamics_.take({});
+  dynamics_.set_bodies({});
   for (size_t i = rigid_.bodies.size(); i-- > 0;) {
     broadphase_.destroyProxy(rigid_.bodies[i].bullet->getBroadphaseHandle(), &dispatcher_);
   }
@@ -600,7 +600,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
     bodies.push_back(&mover);
     movers.emplace_back(&mover, mover.getWorldTransform());
   }
-  dynamics_.take(bodies);
+  dynamics_.set_bodies(bodies);
   const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
   for (int s = 0; s < substeps_[pace]; ++s) {
     before_substep(pace, substep_s);

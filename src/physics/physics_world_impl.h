@@ -63,7 +63,7 @@ class PhysicsWorld::Impl {
 
   void step();
   void read(Snapshot& snapshot);
-  void take(const Impl& other);
+  void copy_from(const Impl& other);
   void exchange(StateArchive& archive);
 
   void set_pose(BodyIndex body, const Pose& pose) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "base/text.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::physics {
@@ -16,8 +17,8 @@ bool finite(const Pose& X) {
 bool finite(const Twist& twist) { return std::isfinite(twist.linear.sum() + twist.angular.sum()); }
 
 [[noreturn]] void fail(const Snapshot& snapshot, const std::string& what) {
-  throw StateError("at " + world::shown(static_cast<double>(snapshot.time) * 1e-6) +
-                   " s the state of " + what +
+  throw StateError("at " + shown(static_cast<double>(snapshot.time) * 1e-6) + " s the state of " +
+                   what +
                    " is not finite: the run ends with the step before. Masses, inertias and "
                    "efforts that do not fit each other do this");
 }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/xml.h"
 #include "ruedo/math.h"
 
 namespace ruedo::report {
@@ -17,22 +18,9 @@ constexpr double kWidth = 720, kHeight = 440, kLeft = 68, kRight = 18, kTop = 40
 constexpr const char *kGridColour = "#e4e4e4", *kAxisColour = "#404040",
                      *kDashes = " stroke-dasharray=\"6 4\"";
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<')
-      result += "&lt;";
-    else if (c == '&')
-      result += "&amp;";
-    else
-      result += c;
-  }
-  return result;
-}
-
 std::string text(double x, double y, const char* anchor, const std::string& what) {
   return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor,
-                     escaped(what));
+                     xml_escaped(what));
 }
 
 std::string stroke(double x1, double y1, double x2, double y2, const char* colour) {
@@ -120,7 +108,7 @@ std::string SvgPlot::grid(const Axes& axes) const {
   return out + fmt::format(
                    "<text transform=\"translate(18 {:.1f}) rotate(-90)\" "
                    "text-anchor=\"middle\">{}</text>\n",
-                   0.5 * (y.from + y.to), escaped(y_label_));
+                   0.5 * (y.from + y.to), xml_escaped(y_label_));
 }
 
 std::string SvgPlot::drawn(const Curve& curve, const Axes& axes) {
@@ -159,7 +147,7 @@ std::string SvgPlot::svg() const {
       "font-family=\"sans-serif\" font-size=\"13\">\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n"
       "<text x=\"{2}\" y=\"24\" text-anchor=\"middle\" font-size=\"15\">{3}</text>\n",
-      kWidth, height, 0.5 * (axes.x.from + axes.x.to), escaped(title_));
+      kWidth, height, 0.5 * (axes.x.from + axes.x.to), xml_escaped(title_));
   out += grid(axes);
   for (const Curve& curve : curves_) out += drawn(curve, axes);
   return out + legend(axes.x.from + 20, bottom + 14) + "</svg>\n";

@@ -8,8 +8,8 @@
 
 #include "base/whole.h"
 #include "ruedo/math.h"
-#include "world/model/placement.h"
-#include "world/read/geometry.h"
+#include "world/drives/placement.h"
+#include "world/model/bounds.h"
 
 namespace ruedo::robot {
 
@@ -220,7 +220,7 @@ Crowd::Crowd(const world::WorldModel& world, const world::BodyLayout& layout,
 
 Crowd::~Crowd() = default;
 
-void Crowd::take(const Crowd& other) {
+void Crowd::copy_from(const Crowd& other) {
   seed_ = other.seed_;
   thought_ = other.thought_;
   for (size_t i = 0; i < groups_.size(); ++i) *groups_[i] = *other.groups_[i];

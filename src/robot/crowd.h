@@ -37,7 +37,7 @@ class Crowd {
   // what they react to from now on
   void add(InstanceIndex instance, const world::BodyLayout& layout);
   void remove(InstanceIndex instance);
-  void take(const Crowd& other);  // takes the state of another copy of the world
+  void copy_from(const Crowd& other);  // takes the state of another copy of the world
   void exchange(StateArchive& archive);
   void reseed(uint64_t seed);  // for people's choices from now on
   void reset(InstanceIndex instance, SimTime now);

@@ -30,7 +30,7 @@ class Drive {
 
   // Takes the state of the drive of the same robot in another copy of the world. Throws InputError
   // if a plugin's drive does not support that.
-  virtual void take(const Drive& other) = 0;
+  virtual void copy_from(const Drive& other) = 0;
   // Writes what changes, or reads it. Throws ArchiveError for a plugin's drive.
   virtual void exchange(StateArchive& archive);
 

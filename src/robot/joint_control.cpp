@@ -142,11 +142,11 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
       return gains_.push_back({joint, value});
     default: break;
   }
-  hold(joint, mode, value);
+  set_target(joint, mode, value);
 }
 
 // A position, rate or effort command.
-void JointControl::hold(JointIndex joint, int8_t mode, double value) {
+void JointControl::set_target(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   std::erase_if(targets_, [joint](const Target& each) { return each.joint == joint; });
   const world::JointAxis& axis = description(joint).axis;
@@ -166,7 +166,7 @@ void JointControl::begin(JointIndex joint) {
   const world::JointStart& start = axis_of.axis.start;
   if (start.mode == world::JointStart::Mode::free || axis_of.leader.valid()) return;
   const bool rate = start.mode == world::JointStart::Mode::velocity;
-  hold(joint, rate ? Mode::VELOCITY : Mode::POSITION, start.value);
+  set_target(joint, rate ? Mode::VELOCITY : Mode::POSITION, start.value);
 }
 
 void JointControl::start(InstanceIndex instance) {
@@ -217,7 +217,7 @@ void JointControl::serve(Target& target, const world::Pid& pid) const {
 void JointControl::before_step() {
   holds_.before_step();
   for (const Lifts::Order& order : lifts_.before_step())
-    hold(order.joint, joint_command_t::POSITION, order.position);
+    set_target(order.joint, joint_command_t::POSITION, order.position);
   for (Target& target : targets_) {
     const world::JointAxis& axis = description(target.joint).axis;
     const std::optional<world::Pid>& pid = target.is_rate ? axis.rate_pid : axis.position_pid;

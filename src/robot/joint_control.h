@@ -58,7 +58,7 @@ class JointControl {
   bool tell_others(InstanceIndex instance, const std::string& name, int8_t mode, double value);
   double gain_of(JointIndex joint) const;
   bool is_set(JointIndex joint) const;  // by a message: the gains are those of docs/world-files.md
-  void hold(JointIndex joint, int8_t mode, double value);
+  void set_target(JointIndex joint, int8_t mode, double value);
   void begin(JointIndex joint);
   void serve(Target& target, const world::Pid& pid) const;
 

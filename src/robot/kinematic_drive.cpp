@@ -78,11 +78,12 @@ KinematicDrive::KinematicDrive(const world::WorldModel& world, const world::Body
   stand_on_near_plane();
 }
 
-void KinematicDrive::take(const Drive& other) {
+void KinematicDrive::copy_from(const Drive& other) {
   const auto& from = static_cast<const KinematicDrive&>(other);
-  if (model_ && !model_->take(*from.model_)) {
-    throw InputError({}, "the drive of robot '" + robot_name() +
-                             "' is a plugin's that cannot be copied: it lacks DriveModel::take()");
+  if (model_ && !model_->copy_from(*from.model_)) {
+    throw InputError({},
+                     "the drive of robot '" + robot_name() +
+                         "' is a plugin's that cannot be copied: it lacks DriveModel::copy_from()");
   }
   *this = from;
 }

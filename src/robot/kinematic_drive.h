@@ -34,7 +34,7 @@ class KinematicDrive final : public Drive {
   void after_step(SimTime now) override;
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
-  void take(const Drive& other) override;
+  void copy_from(const Drive& other) override;
   void exchange(StateArchive& archive) override;
   void ground_changed() override;
 
@@ -93,7 +93,7 @@ class KinematicDrive final : public Drive {
   struct Model : std::unique_ptr<DriveModel> {
     using std::unique_ptr<DriveModel>::operator=;
     Model() = default;
-    Model& operator=(const Model&) { return *this; }  // copied separately, in take()
+    Model& operator=(const Model&) { return *this; }  // copied separately, in copy_from()
   } model_;
   BaseVelocity made_;     // the plugin drive's last output
   Lag lag_;               // of the plugin drive's output, behind the plan

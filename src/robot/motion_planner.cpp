@@ -11,7 +11,7 @@
 
 #include "ruedo/math.h"
 #include "ruedo/quantity.h"
-#include "world/model/drive.h"
+#include "world/drives/drive.h"
 
 namespace ruedo::robot {
 
@@ -121,7 +121,7 @@ void MotionPlanner::command(const VelocityCommand& command, SimTime now) {
     return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
   if (command.vy != 0.0 && !moves_sideways())
     return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
-  hold(command.vx, command.vy, command.omega, now, Status::KIND_VELOCITY);
+  set_velocity(command.vx, command.vy, command.omega, now, Status::KIND_VELOCITY);
 }
 
 void MotionPlanner::command(const WheelCommand& command, SimTime now) {
@@ -145,7 +145,7 @@ void MotionPlanner::command(const WheelCommand& command, SimTime now) {
   left_rate /= static_cast<double>(of_left);
   right_rate /= static_cast<double>(n - of_left);
   const PlaneMotion motion = kinematics_.motion({left_rate, right_rate});
-  hold(motion.v, 0.0, motion.omega, now, Status::KIND_WHEELS);
+  set_velocity(motion.v, 0.0, motion.omega, now, Status::KIND_WHEELS);
 }
 
 // For mecanum and omni wheels: the twist with the least squared error of rates.
@@ -160,7 +160,7 @@ void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
   }
   const Vec3 twist = normal.ldlt().solve(sum);
   if (!twist.allFinite()) return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
-  hold(twist.x(), twist.y(), twist.z(), now, Status::KIND_WHEELS);
+  set_velocity(twist.x(), twist.y(), twist.z(), now, Status::KIND_WHEELS);
 }
 
 // The combination may be too fast for a wheel: the direction is kept.
@@ -188,7 +188,7 @@ void MotionPlanner::steer_for(double v, double omega) {
     target_steering_ = std::copysign(most, omega * drive_->wheelbase);
 }
 
-void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_t kind) {
+void MotionPlanner::set_velocity(double v, double side, double omega, SimTime now, int8_t kind) {
   v = std::clamp(v, -way_limits_.speed, way_limits_.speed);
   side = std::clamp(side, -side_limits_.speed, side_limits_.speed);
   omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);

@@ -85,7 +85,7 @@ class MotionPlanner {
   double seconds(SimTime now) const { return static_cast<double>(now - start_) * 1e-6; }
   bool is_steered() const;  // turns by steering only: not on the spot
   bool moves_sideways() const;
-  void hold(double v, double side, double omega, SimTime now, int8_t kind);
+  void set_velocity(double v, double side, double omega, SimTime now, int8_t kind);
   void hold_wheels(const WheelCommand& command, SimTime now);
   void steer_for(double v, double omega);
   void keep_wheel_rates(double& v, double& side, double& omega) const;

@@ -31,7 +31,7 @@ class Robots::Impl {
   void set_twist(InstanceIndex instance, const Twist& twist);
   void reset(InstanceIndex instance);
   SimTime set_time_to_zero();
-  void take(const Impl& other);
+  void copy_from(const Impl& other);
   void exchange(StateArchive& archive);
   void reseed(uint64_t seed) {
     crowd_.reseed(seed);
@@ -158,13 +158,13 @@ void Robots::Impl::step() {
   for (MotionLog& log : driveless_) log.advance();
 }
 
-void Robots::Impl::take(const Impl& other) {
+void Robots::Impl::copy_from(const Impl& other) {
   step_ = other.step_;
   for (const RobotIndex i : drives_.indices())
-    if (drives_[i]) drives_[i]->take(*other.drives_[i]);
+    if (drives_[i]) drives_[i]->copy_from(*other.drives_[i]);
   driveless_ = other.driveless_;
   for (size_t i = 0; i < movers_.size(); ++i) *movers_[i] = *other.movers_[i];
-  crowd_.take(other.crowd_);
+  crowd_.copy_from(other.crowd_);
   surroundings_ = other.surroundings_;
   joints_ = other.joints_;
   wind_ = other.wind_;
@@ -397,7 +397,7 @@ Robots::~Robots() = default;
 void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }
 void Robots::read(Snapshot& snapshot) const { impl_->read(snapshot); }
-void Robots::take(const Robots& other) { impl_->take(*other.impl_); }
+void Robots::copy_from(const Robots& other) { impl_->copy_from(*other.impl_); }
 void Robots::exchange(StateArchive& archive) { impl_->exchange(archive); }
 int64_t Robots::current_step() const { return impl_->step_; }
 void Robots::add(InstanceIndex instance) { impl_->add(instance); }

@@ -66,7 +66,7 @@ class Robots {
 
   // Between two steps: takes the state of another copy of the same world, after the physics has
   // done so. Throws InputError for a plugin's drive that cannot be copied.
-  void take(const Robots& other);
+  void copy_from(const Robots& other);
   // Writes that state, or reads it, likewise. Throws ArchiveError for a plugin's drive.
   void exchange(StateArchive& archive);
 

@@ -31,7 +31,7 @@ class WheelsDrive final : public Drive {
   void after_step(SimTime now) override;
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
-  void take(const Drive& other) override { *this = static_cast<const WheelsDrive&>(other); }
+  void copy_from(const Drive& other) override { *this = static_cast<const WheelsDrive&>(other); }
   void exchange(StateArchive& archive) override;
 
  private:

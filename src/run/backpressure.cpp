@@ -20,7 +20,7 @@ std::optional<LauncherProgress> read_launcher_progress(std::string_view line) {
   return is_whole ? std::optional(progress) : std::nullopt;
 }
 
-void Backpressure::take(const LauncherProgress& progress) {
+void Backpressure::note_progress(const LauncherProgress& progress) {
   const std::lock_guard lock(mutex_);
   acts_ = true;
   if (progress.epoch != progress_.epoch) return;

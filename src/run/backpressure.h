@@ -46,7 +46,7 @@ class Backpressure {
   explicit Backpressure(int64_t step_us) : step_us_(step_us) {}
 
   // Any thread, as all that follows. What is of another epoch is ignored.
-  void take(const LauncherProgress& progress);
+  void note_progress(const LauncherProgress& progress);
   void end();  // nobody is waited for any more
   // The run goes on from there.
   void begin(int32_t epoch, SimTime time_us);

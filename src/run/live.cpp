@@ -17,8 +17,8 @@ void Live::models_changed(const Stage& stage, int64_t step) {
   if (wait_for_) wait_for_->models_changed(*stage.channels, step);
 }
 
-bool Live::receive(const std::string& channel, const uint8_t* data, size_t size) {
-  return wait_for_ && wait_for_->receive(channel, data, size);
+bool Live::on_message(const std::string& channel, const uint8_t* data, size_t size) {
+  return wait_for_ && wait_for_->on_message(channel, data, size);
 }
 
 std::string Live::waits_for(int64_t step) const {

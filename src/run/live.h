@@ -18,7 +18,7 @@ class Live : public Mode {
   void begin(const Stage& stage, int64_t step) override;
   void models_changed(const Stage& stage, int64_t step) override;
   std::string waits_for(int64_t step) const override;
-  bool receive(const std::string& channel, const uint8_t* data, size_t size) override;
+  bool on_message(const std::string& channel, const uint8_t* data, size_t size) override;
 
  private:
   std::unique_ptr<WaitFor> wait_for_;  // null: for no client

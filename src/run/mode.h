@@ -3,8 +3,8 @@
 //
 // The run asks its mode whether it may go on, tells it what was published, and asks when it wants
 // to be called again. States, requests and messages are the same in all modes. The
-// publisher's thread calls everything here; receive() comes from any thread, never beside begin()
-// or attend().
+// publisher's thread calls everything here; on_message() comes from any thread, never beside
+// begin() or attend().
 #pragma once
 
 #include <chrono>
@@ -112,7 +112,7 @@ class Mode {
   // ---- Clients
 
   // A command as it came; true: the mode has handled it.
-  virtual bool receive(const std::string& channel, const uint8_t* data, size_t size) {
+  virtual bool on_message(const std::string& channel, const uint8_t* data, size_t size) {
     static_cast<void>(channel), static_cast<void>(data), static_cast<void>(size);
     return false;
   }

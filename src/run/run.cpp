@@ -126,7 +126,7 @@ void Run::add_sinks() {
 
 Control::Host Run::control_host() {
   return {.execute = [this](const request_t& request,
-                            const Session& session) { return ask(request, session); },
+                            const Session& session) { return admit(request, session); },
           .state = [this] { return engine::encoded(state()); },
           .publish = [this](const reply_t& reply) { publisher_.service(own_.reply, reply); },
           .utime = [this] { return publisher_.time_us(); },
@@ -138,14 +138,14 @@ Control::Host Run::control_host() {
           .keeps = [this](int64_t session) { return mode_->keeps(session); }};
 }
 
-void Run::receive(const std::string& channel, const uint8_t* data, size_t size) {
+void Run::on_message(const std::string& channel, const uint8_t* data, size_t size) {
   if (options_.hearer) options_.hearer(channel, data, size);
   if (!request_channel_.empty() && channel == request_channel_) {
-    if (control_.receive(data, size)) wakeup_.set();
+    if (control_.on_request(data, size)) wakeup_.set();
     return;
   }
   const std::lock_guard lock(simulation_mutex_);
-  if (!mode().receive(channel, data, size)) simulation_->inbox().receive(channel, data, size);
+  if (!mode().on_message(channel, data, size)) simulation_->inbox().put(channel, data, size);
 }
 
 void Run::stop() {
@@ -156,7 +156,7 @@ void Run::stop() {
 void Run::run() {
   std::fesetenv(FE_DFL_ENV);  // as in the threads that compute: in lockstep this is one of them
   bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) {
-    receive(channel, data, size);
+    on_message(channel, data, size);
   });
   begin_log();
   tell_readers();
@@ -183,7 +183,7 @@ void Run::publish_what_is_ready() {
   for (;;) {
     stall_watch_.beat(StallWatch::At::messages);
     if (stop_) simulation_->leave_off();
-    const engine::Batch* batch = has_room() || stop_ ? simulation_->take() : nullptr;
+    const engine::Batch* batch = has_room() || stop_ ? simulation_->next_batch() : nullptr;
     if (!batch) return;
     publish(*batch);
     tell_status();

@@ -96,13 +96,13 @@ class Run {
 
   // A command on one of the input channels, or a request, from the bus or another transport. Its
   // bytes have not been checked. Any thread.
-  void receive(const std::string& channel, const uint8_t* data, size_t size);
-  void receive(const std::string& channel, const std::vector<uint8_t>& bytes) {
-    receive(channel, bytes.data(), bytes.size());
+  void on_message(const std::string& channel, const uint8_t* data, size_t size);
+  void on_message(const std::string& channel, const std::vector<uint8_t>& bytes) {
+    on_message(channel, bytes.data(), bytes.size());
   }
 
   // From the program that launched this run: it is not left behind from now on. Any thread.
-  void take(const LauncherProgress& progress);
+  void note_progress(const LauncherProgress& progress);
   // There is no such program, or none that says how far it is. Any thread.
   void follow_nobody();
 
@@ -190,8 +190,8 @@ class Run {
   void break_repeat_off();  // the world stays where it is, paused
 
   // Requests; in requests/requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of
-  // clients go through ask(), those of a log are executed.
-  Outcome ask(const request_t& request, const Session& session);
+  // clients go through admit(), those of a log are executed.
+  Outcome admit(const request_t& request, const Session& session);
   Outcome execute(const request_t& request, const Session& session);
   bool serves(const RequestKind& kind) const;
   bool ends_restore(const RequestKind& kind) const;

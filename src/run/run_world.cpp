@@ -59,11 +59,11 @@ void Run::begin_mode(Mode& mode, int64_t step) {
   limit_pace();
 }
 
-void Run::take(const LauncherProgress& progress) {
+void Run::note_progress(const LauncherProgress& progress) {
   if (mode_->takes_grants()) return;  // they say how far the run goes
   const std::lock_guard lock(simulation_mutex_);
   if (!backpressure_.acts()) bus_.keep_all_for_launcher();
-  backpressure_.take(progress);
+  backpressure_.note_progress(progress);
   limit_pace();
   wakeup_.set();  // the publisher goes on, or wakes who does
 }

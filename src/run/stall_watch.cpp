@@ -79,10 +79,10 @@ void StallWatch::look(Clock::time_point now) {
   const Clock::duration blind = now - std::exchange(last_look_, now);
   const uint64_t beats = beats_.load(std::memory_order_acquire);
   if (blind > kPatience) {
-    to_tell_.push_back(fmt::format(
-        "this process was held up for {:.1f} s: stopped by a signal, or without a processor. "
-        "Sim time goes on from where it was",
-        std::chrono::duration<double>(blind).count()));
+    to_tell_.push_back(
+        fmt::format("this process did not run for {:.1f} s: a signal stopped it, or it got no "
+                    "processor. Sim time continues where it stopped",
+                    std::chrono::duration<double>(blind).count()));
     last_beat_ = now;  // no client is to blame
   } else if (beats != std::exchange(seen_beats_, beats)) {
     last_beat_ = now;

@@ -68,15 +68,16 @@ void WaitFor::models_changed(const engine::Channels& channels, int64_t step) {
 
 void WaitFor::begin(Waited& waited, engine::InputIndex input, int64_t step) {
   if (waited.input.valid() && !input.valid()) {
-    spdlog::info("{}: its robot is gone: nothing is waited for until one of that name comes",
-                 waited.channel);
+    spdlog::info(
+        "{}: its robot was removed: the run does not wait until a robot of that name appears",
+        waited.channel);
   }
   waited.input = input;
   if (input.valid()) waited.channel = inbox_->inputs()[input].channel;
   waited.next = waited.clock.samples_before(std::max<int64_t>(step, 0));
 }
 
-bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t size) {
+bool WaitFor::on_message(const std::string& channel, const uint8_t* data, size_t size) {
   const auto waited = std::find_if(waited_.begin(), waited_.end(), [&](const Waited& w) {
     return w.input.valid() && w.channel == channel;
   });
@@ -84,9 +85,8 @@ bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t si
   if (waited->next - waited->clock.samples_before(inbox_->next_step()) >= kMostAhead) {
     if (!waited->told) {
       spdlog::warn(
-          "{}: its messages come faster than the {:g} Hz of --wait-for; those that find no room "
-          "are ignored, and the run "
-          "cannot be repeated that way (this is said once)",
+          "{}: its messages arrive faster than the {:g} Hz of --wait-for; the surplus is ignored, "
+          "and the run cannot be repeated (shown once)",
           channel, waited->option.rate.hz());
     }
     waited->told = true;

@@ -37,7 +37,7 @@ class WaitFor {
   void models_changed(const engine::Channels& channels, int64_t step);
 
   // False: the channel is none of these.
-  bool receive(const std::string& channel, const uint8_t* data, size_t size);
+  bool on_message(const std::string& channel, const uint8_t* data, size_t size);
 
   // What has to come before the state after `step` can be computed, in words; "": nothing.
   std::string waits_for(int64_t step) const;

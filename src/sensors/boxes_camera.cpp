@@ -14,7 +14,7 @@
 #include "sensors/camera_view.h"
 #include "sensors/placed_models.h"
 #include "sensors/seen_things.h"
-#include "world/read/geometry.h"
+#include "world/model/bounds.h"
 
 namespace ruedo {
 namespace {

@@ -48,10 +48,10 @@ class ContactSensor : public SensorOf<ContactSensor> {
       if (shape) {
         shapes_.push_back(*shape);
       } else if (name != "__default__" && setup.findings) {
-        setup.findings->unsupported(
-            named->source, "sensor " + setup.device + "/contact/collision",
-            "'" + named->text +
-                "' is no collision of the sensor's link; without another one, all of them count");
+        setup.findings->unsupported(named->source, "sensor " + setup.device + "/contact/collision",
+                                    "'" + named->text +
+                                        "' is not a collision of the sensor's link; without "
+                                        "another one, all of them count");
       }
     }
   }

@@ -66,7 +66,7 @@ auto call(const std::string& who, Function function) {
   } catch (abi::__forced_unwind&) {
     std::terminate();  // the thread is Ruedo's, which cannot go on without it
   } catch (...) {
-    throw std::runtime_error(who + ": threw what is no std::exception");
+    throw std::runtime_error(who + ": threw something other than a std::exception");
   }
 }
 
@@ -152,9 +152,10 @@ class GuardedSensor : public Sensor {
   void shift_time(SimTime us) override {
     call(who_, [&] { sensor_->shift_time(us); });
   }
-  bool take(const Sensor& other) override {
-    return call(who_,
-                [&] { return sensor_->take(*static_cast<const GuardedSensor&>(other).sensor_); });
+  bool copy_from(const Sensor& other) override {
+    return call(who_, [&] {
+      return sensor_->copy_from(*static_cast<const GuardedSensor&>(other).sensor_);
+    });
   }
   bool exchange_state(StateArchive& archive) override {
     return call(who_, [&] { return sensor_->exchange_state(archive); });
@@ -179,7 +180,7 @@ class GuardedSensor : public Sensor {
                                           [](unsigned char c) { return c <= ' ' || c >= 0x7f; });
           wrong != text.end()) {
         throw std::logic_error("'" + line(text.c_str()) +
-                               "' is no name of a channel or a type: printable ASCII characters "
+                               "' is not a name of a channel or a type: printable ASCII characters "
                                "without spaces are allowed");
       }
     }
@@ -241,9 +242,9 @@ class GuardedDrive : public DriveModel {
   BaseVelocity step(const DriveInput& input) override {
     return call(who_, [&] { return drive_->step(input); });
   }
-  bool take(const DriveModel& other) override {
+  bool copy_from(const DriveModel& other) override {
     return call(who_,
-                [&] { return drive_->take(*static_cast<const GuardedDrive&>(other).drive_); });
+                [&] { return drive_->copy_from(*static_cast<const GuardedDrive&>(other).drive_); });
   }
 
  private:

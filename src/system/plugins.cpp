@@ -83,13 +83,13 @@ std::array<int64_t, 4> state_of(const std::string& path) {
 std::string built_for(const std::string& bytes, const std::string& path) {
   if (!std::string_view(bytes).starts_with(kElf))
     throw InputError({path},
-                     "is no shared library; a plugin is built by CMake's target ruedo::plugin");
+                     "is not a shared library; a plugin is built by CMake's target ruedo::plugin");
   check_whole(bytes, path);
   const size_t at = bytes.find(kMark);
   const size_t begin = at + kMark.size();
   if (at == std::string::npos || begin >= bytes.size() || bytes[begin] == '\0')
-    throw InputError({path},
-                     "is no plugin of Ruedo: it was not linked with CMake's target ruedo::plugin");
+    throw InputError(
+        {path}, "is not a plugin of Ruedo: it was not linked with CMake's target ruedo::plugin");
   return bytes.substr(begin, bytes.find('\0', begin) - begin);
 }
 
@@ -155,7 +155,7 @@ const PluginEntry& open(const std::string& path) {
   }
   const auto* entry = static_cast<const PluginEntry*>(dlsym(library, "ruedo_plugin_entry"));
   if (entry == nullptr || !entry->abi || !entry->sensors || !entry->drives)
-    throw InputError({path}, "is no plugin of Ruedo: it has no ruedo_plugin_entry");
+    throw InputError({path}, "is not a plugin of Ruedo: it has no ruedo_plugin_entry");
   check_abi(entry->abi, path);
   return *entry;
 }

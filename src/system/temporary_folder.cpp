@@ -15,7 +15,7 @@ namespace ruedo {
 TemporaryFolder::TemporaryFolder(const std::string& purpose) {
   std::error_code error;
   const fs::path temporary = fs::temp_directory_path(error);
-  if (error) throw EnvironmentError("TMPDIR is no folder: " + error.message());
+  if (error) throw EnvironmentError("TMPDIR is not a folder: " + error.message());
   path_ = (temporary / ("ruedo-" + purpose + "-XXXXXX")).string();
   if (!::mkdtemp(path_.data()))
     throw EnvironmentError("no folder can be made in " + temporary.string() + ": " +

@@ -7,15 +7,16 @@
 #include <optional>
 
 #include "base/progress.h"
+#include "base/text.h"
 #include "ruedo/math.h"
+#include "world/document/reserved_names.h"
+#include "world/drives/drive.h"
+#include "world/drives/holds.h"
+#include "world/drives/lifts.h"
+#include "world/drives/placement.h"
 #include "world/edit/world_text.h"
 #include "world/load_model.h"
-#include "world/model/drive.h"
-#include "world/model/holds.h"
-#include "world/model/lifts.h"
 #include "world/model/own_plugins.h"
-#include "world/model/placement.h"
-#include "world/read/reserved_names.h"
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 #include "world/settings.h"
@@ -150,9 +151,10 @@ class Loader {
           // The user's own ground plane replaces ours.
           std::erase_if(world_.models, [&](const auto& other) { return other.name == name; });
           if (!scope->relative_to.empty() && scope->relative_to != "world")
-            findings_.error(child->source, "model " + name,
-                            "<pose> is relative to '" + scope->relative_to +
-                                "', which is no frame beside the model; it is that in the world");
+            findings_.error(
+                child->source, "model " + name,
+                "<pose> is relative to '" + scope->relative_to +
+                    "', which is not a frame beside the model; it is that in the world");
           add(name, scope->pose, scope->model, child->source);
         }
         any = true;

@@ -62,7 +62,8 @@ std::string model_file(const std::string& name, const std::string& world_file) {
   const auto path = resources.find_model(name, world_file);
   if (!path)
     throw InputError(
-        {}, "'" + name + "' is no model of Ruedo's and no file in the folders that are searched");
+        {},
+        "'" + name + "' is not a model of Ruedo's and no file in the folders that are searched");
   return *path;
 }
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "world/document/load_budget.h"
 #include "world/model/world_model.h"
-#include "world/read/load_budget.h"
 
 namespace ruedo::world {
 

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "base/utf8.h"
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 namespace fs = std::filesystem;
 

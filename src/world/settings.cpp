@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "ruedo/sensor.h"
-#include "world/model/drive.h"
-#include "world/model/odd_drive.h"
+#include "world/drives/drive.h"
+#include "world/drives/odd_drive.h"
 #include "world/sdf/sdf_reader.h"
 
 namespace ruedo::world {

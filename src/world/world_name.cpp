@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "ruedo/errors.h"
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 namespace fs = std::filesystem;
 

@@ -200,7 +200,7 @@ TEST(Schema, AMessageHasFewFieldsForItsBytes) {
 TEST(Schema, RefusesTypesThatNoReaderReadsAlike) {
   const fs::path file = fs::path(testing::TempDir()) / "bad_t.lcm";
   const std::string no_counter =
-      " is no field before it that is one int8_t, int16_t, int32_t or int64_t";
+      " is not a field before it that is one int8_t, int16_t, int32_t or int64_t";
   std::string dimensions = "struct a_t {\n int8_t x";
   for (int i = 0; i < 17; ++i) dimensions += "[1]";
   using namespace std::string_literals;
@@ -215,7 +215,7 @@ TEST(Schema, RefusesTypesThatNoReaderReadsAlike) {
        ":2: the type 'a_t': 'x' is of the type 'b_t', which is in no .lcm file that was read"},
       {"\nstruct a_t { int32_t n; a_t x[n]; }",
        ":2: the type 'a_t': it holds itself, which cannot be read"},
-      {"struct a_t { int8_t x\0; }"s, ": contains a zero byte: it is no text"}};
+      {"struct a_t { int8_t x\0; }"s, ": contains a zero byte: it is not a text"}};
   for (const auto& [text, why] : cases) {
     std::ofstream(file, std::ios::binary) << text;
     try {

@@ -84,14 +84,14 @@ struct Client {
     EXPECT_TRUE(
         connection.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size()));
   }
-  bool take(int timeout_ms = -1) {
-    return connection.take(timeout_ms,
-                           [this](std::string_view channel, const uint8_t* data, size_t size) {
-                             came.emplace_back(channel, std::string(data, data + size));
-                           });
+  bool receive(int timeout_ms = -1) {
+    return connection.receive(timeout_ms,
+                              [this](std::string_view channel, const uint8_t* data, size_t size) {
+                                came.emplace_back(channel, std::string(data, data + size));
+                              });
   }
   void take_until(size_t count) {
-    while (came.size() < count && !connection.is_over()) take();
+    while (came.size() < count && !connection.is_over()) receive();
   }
 };
 
@@ -202,7 +202,7 @@ Messages flooded(Served& served, Client& slow) {
   served.publish("end", "");
   served.server.flush();
   while ((slow.came.empty() || slow.came.back().first != "end") && !slow.connection.is_over())
-    slow.take();
+    slow.receive();
   return slow.came;
 }
 
@@ -245,7 +245,7 @@ TEST(UnixServer, WhatIsNotConflatedDoesNotWaitForWhatIs) {
     return std::find(slow.came.begin(), slow.came.end(),
                      std::pair<std::string, std::string>{"reply", "1"});
   };
-  while (place_of_reply() == slow.came.end() && !slow.connection.is_over()) slow.take();
+  while (place_of_reply() == slow.came.end() && !slow.connection.is_over()) slow.receive();
   EXPECT_LT(place_of_reply() - slow.came.begin(), 12);  // what the kernel had taken already
 }
 
@@ -278,7 +278,7 @@ TEST(UnixServer, TheLauncherGetsAll) {
   int count = 0;
   bool ended = false;
   while (!ended && !connection.is_over()) {
-    connection.take(100, [&](std::string_view channel, const uint8_t*, size_t) {
+    connection.receive(100, [&](std::string_view channel, const uint8_t*, size_t) {
       ended = channel == "end";
       count += channel == "state";
     });
@@ -342,7 +342,7 @@ TEST(UnixServer, WhatWasPublishedLastComes) {
   served->server.stop();
   client.take_until(1000);
   EXPECT_EQ(client.came.size(), 1000u);
-  while (client.take()) {
+  while (client.receive()) {
   }
   EXPECT_TRUE(client.connection.is_over());
 }

@@ -354,7 +354,7 @@ WRONG = [
     ("p3at/lrf:freeze@1,four=2", "'four' of freeze is not allowed; allowed are for"),
     ("p3at/laser:freeze@1", "there is no device 'laser' to be faulty; p3at has .*lrf"),
     ("r2d2/lrf:freeze@1", "a fault of robot 'r2d2'; the world has p3at"),
-    ("p3at/odometry:blocked@1,value=1", "blocked is no fault of an odometry"),
+    ("p3at/odometry:blocked@1,value=1", "blocked is not a fault of an odometry"),
     (
         "p3at/lrf:weak_motor@1,value=0.5",
         "target 'lrf' of weak_motor is not allowed; allowed are left, right",

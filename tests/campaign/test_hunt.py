@@ -532,7 +532,7 @@ WRONG = [  # more of the file, its `hunt`, what the message says
     (
         "",
         {"faults": [{"kind": "freeze", "target": "lrf"}, {"kind": "freeze", "target": "{nope}"}]},
-        r"faults\[1\]: .*{nope} is no parameter",
+        r"faults\[1\]: .*{nope} is not a parameter",
     ),
     ("", {"obstacles": {"most": 1, "area": [-1e308, 0, 1e308, 0]}}, "area: is .*of at most 1e.06"),
 ]

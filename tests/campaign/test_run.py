@@ -387,7 +387,7 @@ def test_show_and_repeat(whole):
     assert "p3at/lrf" in (folder / "full.lcm").read_bytes().decode("latin-1")
     assert "repeated byte for byte" in ruedo("verify", "full.lcm", folder=folder).stdout
     assert (
-        "is no case of walls"
+        "is not a case of walls"
         in ruedo("campaign", "show", "c.yaml", "8", folder=folder, code=3).stderr
     )
 

@@ -152,12 +152,12 @@ WRONG = [  # what is replaced, by what, line, what the message says
         8,
         r"uniform: is \[3, 1\]; allowed is \[low, high\]",
     ),
-    ("distance: [1.2, 3.0]", "seed: [1.2, 3.0]", 8, "seed: is no name of a parameter"),
+    ("distance: [1.2, 3.0]", "seed: [1.2, 3.0]", 8, "seed: is not a name of a parameter"),
     (
         "distance: \"{distance}\"",
         "distance: \"{distanec}\"",
         4,
-        "{distanec} is no parameter; there are bold, distance",
+        "{distanec} is not a parameter; there are bold, distance",
     ),
     (
         "controller.py:ahead",
@@ -168,11 +168,11 @@ WRONG = [  # what is replaced, by what, line, what the message says
     ("controller.py:ahead", "controller", 6, "it looks like FILE.py:NAME"),
     ("world.py:walls", "world.py:wall", 4, "world.py has no wall"),
     ("disable: [p3at/camera", "disable: [p3at/camera]]", 11, "no YAML"),
-    ("seeds: 2", "noise: !!bool foo", 10, "'foo' is no bool"),
-    ("seeds: 2", "seeds: !!int ''", 10, "'' is no int"),
-    ("seeds: 2", "seeds: !!int '-'", 10, "'-' is no int"),
-    ("seeds: 2", "seeds: !!float ''", 10, "'' is no float"),
-    ("seeds: 2", "seeds: !!timestamp foo", 10, "'foo' is no timestamp"),
+    ("seeds: 2", "noise: !!bool foo", 10, "'foo' is not of type bool"),
+    ("seeds: 2", "seeds: !!int ''", 10, "'' is not of type int"),
+    ("seeds: 2", "seeds: !!int '-'", 10, "'-' is not of type int"),
+    ("seeds: 2", "seeds: !!float ''", 10, "'' is not of type float"),
+    ("seeds: 2", "seeds: !!timestamp foo", 10, "'foo' is not of type timestamp"),
     ("seeds: 2", "seeds: 0x" + "F" * 5000, 10, "a number of thousands of digits"),
     ("name: walls\nworlds", "name: 0x" + "F" * 5000 + "\nworlds", 2, "a number of thousands"),
     (
@@ -441,7 +441,7 @@ def test_a_file_whose_name_is_no_text_is_told(folder):
     text = CAMPAIGN.replace("name: ahead", "name: ahead, each: 'stud*.py'")
     (folder / "c.yaml").write_text(text.replace("controller.py:ahead", "{file}:ahead"))
     said = ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
-    assert said.count("\n") == 1 and "c.yaml:6: " in said and "no UTF-8: rename it" in said
+    assert said.count("\n") == 1 and "c.yaml:6: " in said and "not UTF-8: rename it" in said
 
 
 @pytest.mark.parametrize(

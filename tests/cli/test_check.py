@@ -116,7 +116,7 @@ FILES = {
         mesh("a.blend"),
         {"a.blend": b"x"},
         1,
-        ("error", 4, COLLISION, "'.blend' is no known kind of mesh; known are obj, dae"),
+        ("error", 4, COLLISION, "'.blend' is not a known kind of mesh; known are obj, dae"),
     ),
     "folder as mesh": (
         mesh("sub"),
@@ -140,7 +140,7 @@ FILES = {
         heightmap("a.png"),
         {"a.png": PNG + bytes(40)},
         1,
-        ("error", 4, COLLISION, "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)"),
+        ("error", 4, COLLISION, "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)"),
     ),
     "huge picture": (
         heightmap("a.png"),
@@ -158,7 +158,7 @@ FILES = {
         texture("a.png"),
         {"a.png": PNG + bytes(40)},
         0,
-        ("unsupported", 0, "", "the texture is no picture that can be read"),
+        ("unsupported", 0, "", "the texture is not a picture that can be read"),
     ),
     "include of a folder": (
         world("<include><uri>sub</uri></include>"),

@@ -89,7 +89,7 @@ def test_nothing_left_to_compare_is_no_pass(logs, pattern):
 
 @pytest.mark.parametrize("content", ["", "header"])
 def test_logs_without_a_message_are_not_the_same(logs, tmp_path, content):
-    """Nothing that was compared is no proof."""
+    """Nothing that was compared is not a proof."""
     empty, said = tmp_path / "empty.lcm", "nothing was compared: there is no message to compare"
     log = lcm.EventLog(str(empty), "w", overwrite=True)
     if content:

@@ -75,7 +75,7 @@ MAP = "image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n"
         ("m.pgm", None, ["--width", "0.001"], 0, ""),
         ("m.yaml", MAP.replace("m.pgm", "../s.pgm"), [], 3, "m.yaml:1: image: '../s.pgm' lies"),
         ("m.yaml", MAP.replace("m.pgm", "../s.pgm"), ["--allow-absolute"], 0, ""),
-        ("m.yaml", MAP + "ocupied_thresh: 0.3\n", [], 0, "m.yaml:4: ocupied_thresh: is no key"),
+        ("m.yaml", MAP + "ocupied_thresh: 0.3\n", [], 0, "m.yaml:4: ocupied_thresh: is not a key"),
         ("m.map", "2D-Map\nDATA\n" + "1 1\n" * 1_500_000, [], 3, "more than 100000 walls"),
     ],
 )

@@ -279,7 +279,7 @@ def test_a_snapshot_of_a_past_state(tmp_path):
         for step, epoch in ((201, 0), (-1, 0), (100, 1)):
             with pytest.raises(ruedo.RequestError, match="allowed are 0 to 200 of epoch 0"):
                 snapshot(step, epoch)
-        with pytest.raises(ruedo.RequestError, match="is no name of a snapshot"):
+        with pytest.raises(ruedo.RequestError, match="is not a name of a snapshot"):
             snapshot(100, 0, "../there")
         simulation.reset(what="time")
         epoch = simulation._info.epoch

@@ -9,21 +9,21 @@ import pytest
 from conftest import ARENA, PROBES, RUEDO
 
 OPTIONS = "ttl, 0 to 255, and recv_buf_size, 1 to 2147483647 bytes, are, each once"
-GROUPS = "is no multicast group (224.0.0.0 to 239.255.255.255)"
+GROUPS = "is not a multicast group (224.0.0.0 to 239.255.255.255)"
 WRONG = {
     "arena": "it has no scheme",
     "udpm:/239.255.76.67": "it has no scheme",
     "http://127.0.0.1:80": "the schemes udpm, tcpq",
     "UDPM://239.255.76.67:7667": "the schemes udpm, tcpq",
-    "unix://bus.sock": "'bus.sock' is no absolute path",
+    "unix://bus.sock": "'bus.sock' is not an absolute path",
     "udpm://127.0.0.1:7667": f"'127.0.0.1' {GROUPS}",
     "udpm://239.255.76:7667": f"'239.255.76' {GROUPS}",
     "udpm://[ff02::1]:7667": "is no",
-    "udpm://239.255.76.67:0": "'0' is no port",
-    "udpm://239.255.76.67:7667/": "'7667/' is no port",
-    "tcpq://127.0.0.1:65536": "'65536' is no port",
+    "udpm://239.255.76.67:0": "'0' is not a port",
+    "udpm://239.255.76.67:7667/": "'7667/' is not a port",
+    "tcpq://127.0.0.1:65536": "'65536' is not a port",
     "tcpq://[::1]:7700": "LCM has no IPv6: '[::1]:7700' is not allowed; give a name or an IPv4",
-    "tcpq://no.such.host.invalid:7700": "'no.such.host.invalid' is no host that this machine knows",
+    "tcpq://no.such.host.invalid:7700": "'no.such.host.invalid' is not a host that this machine knows",
     "tcpq://127.0.0.1:7700?ttl=1": "tcpq has no options",
     "udpm://239.255.76.67:7667?ttl=256": f"the option 'ttl=256' is not allowed: {OPTIONS}",
     "udpm://239.255.76.67:7667?ttl=O": f"the option 'ttl=O' is not allowed: {OPTIONS}",

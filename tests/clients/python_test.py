@@ -26,10 +26,10 @@ import pytest
 import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import lcmtypes, samples
-from ruedo.transport.address import read_address
-from ruedo.session.control import Session
 from ruedo.decoding import decode
 from ruedo.launch import _options
+from ruedo.session.control import Session
+from ruedo.transport.address import read_address
 from ruedo.transport.multicast import MulticastTransport
 
 QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
@@ -819,7 +819,7 @@ MERGE_BOMB = "a0: &a0 {x: 1}\n" + "".join(
         (MERGE_BOMB, "it stands for more than 100000 values"),
         ("&a [*a]", "it stands for more than 100000 values"),
         ("[" * 100_000, "it is nested too deep"),
-        ("2000-99-99", "'2000-99-99' is no timestamp"),
+        ("2000-99-99", "'2000-99-99' is not of type timestamp"),
         ("x" * (1 << 20) + "y", "it has 1048577 bytes; allowed are 1048576"),
         (os.mkfifo, "it is not a regular file"),
         (lambda path: os.symlink("/dev/zero", path), "it is not a regular file"),
@@ -845,11 +845,11 @@ def test_a_hostile_map_or_picture_is_refused_at_once(what, says, tmp_path):
 @pytest.mark.parametrize(
     "picture, says",
     [
-        (b"P5" + b"9" * 5000 + b" 1 255\n1", "is no PGM"),
+        (b"P5" + b"9" * 5000 + b" 1 255\n1", "is not a PGM"),
         (b"P5 0 5 255\n", "0 x 5 pixels is wanted"),
         (b"P5 999999999 999999999 255\n1", "pixels is wanted, and 1 bytes are there"),
-        (b"P5" + b"#\n" * 100_000, "is no PGM"),
-        (b"\x89PNG\r\n\x1a\n" + b"\xff" * 50, "is no picture that can be read"),
+        (b"P5" + b"#\n" * 100_000, "is not a PGM"),
+        (b"\x89PNG\r\n\x1a\n" + b"\xff" * 50, "is not a picture that can be read"),
     ],
 )
 def test_a_broken_picture_of_a_map_is_named(picture, says, tmp_path):

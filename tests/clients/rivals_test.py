@@ -75,7 +75,7 @@ def primitives_of(language: str, url: str, beside: OneBus | None = None) -> tupl
 
 
 def test_each_answers_its_own_clients_alone(language):
-    """The other one's "this is another run" is no answer."""
+    """The other one's "this is another run" is not an answer."""
     with (
         ruedo_run(*QUICK, world=HALL) as first,
         ruedo_run(*QUICK, world=HALL) as second,

@@ -451,7 +451,7 @@ TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
   stage.source = std::make_unique<LiveSource>(tap,
                                               LiveHost{.world = [=] { return world; },
                                                        .model_text = {},
-                                                       .receive = {},
+                                                       .on_message = {},
                                                        .lost = [] { return uint64_t{0}; },
                                                        .save_name = {}},
                                               "ruedo/info");
@@ -468,7 +468,7 @@ TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
 
   stage.source->pump(stage.board, false);  // nobody is there
   Viewer viewer(stage);
-  viewer.receive(want_a);
+  viewer.on_message(want_a);
   publish(0);  // the first on its channel
   EXPECT_EQ(seen(viewer), 1u);
   publish(0);  // the viewer has met the channel
@@ -477,7 +477,7 @@ TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
   Viewer late(stage);
   publish(1);
   EXPECT_EQ(seen(late), 0u);  // it wants nothing
-  late.receive(std::vector<uint8_t>{static_cast<uint8_t>(Operation::want), 'b'});
+  late.on_message(std::vector<uint8_t>{static_cast<uint8_t>(Operation::want), 'b'});
   publish(1);
   EXPECT_EQ(seen(late), 1u);
 }

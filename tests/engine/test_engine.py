@@ -244,7 +244,7 @@ class Wrong:
         (
             lambda e: e.observe("lrf.rangs"),
             ValueError,
-            "'rangs' is no field of numbers in planar_lidar_t; there are utime, nranges, ranges",
+            "'rangs' is not a field of numbers in planar_lidar_t; there are utime, nranges, ranges",
         ),
         (
             lambda e: e.observe("camera.data"),
@@ -265,7 +265,7 @@ class Wrong:
         (lambda e: e.step(np.ma.masked_array([1.0, 2.0], [0, 1])), TypeError, "are numbers"),
         (lambda e: e.observe("scan.\ud800"), ValueError, "with half a character in it"),
         (lambda e: e.observe("scan.ran\0ges"), ValueError, "which holds the character 0"),
-        (lambda e: e.observe("x" * 100_000 + ".y"), ValueError, "xxx... is no DEVICE.FIELD"),
+        (lambda e: e.observe("x" * 100_000 + ".y"), ValueError, "xxx... is not a DEVICE.FIELD"),
         (lambda e: e.command(0, "r0/velocity\0", b""), ValueError, "which holds the character 0"),
         (lambda e: e.command(0, "r0/velocity", Wrong("text")), TypeError, "one of ruedo.lcmtypes"),
         (

@@ -55,7 +55,7 @@ WRONG = {
 def test_what_is_no_policy_is_refused(tmp_path, what):
     file = tmp_path / "policy.npz"
     WRONG[what](file)
-    with pytest.raises(ValueError, match="policy.npz: is no policy that save"):
+    with pytest.raises(ValueError, match="policy.npz: is not a policy that save"):
         Policy.load(file)
 
 

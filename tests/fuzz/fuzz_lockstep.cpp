@@ -185,7 +185,7 @@ class Conversation {
     request.body = std::move(body);
     request.size = static_cast<int32_t>(request.body.size());
     const std::vector<uint8_t> bytes = engine::encoded(request);
-    control_.receive(bytes.data(), bytes.size());
+    control_.on_request(bytes.data(), bytes.size());
     control_.serve();
   }
 
@@ -202,7 +202,7 @@ class Conversation {
     request.size = static_cast<int32_t>(request.body.size());
     const std::vector<uint8_t> bytes = engine::encoded(request);
     joined_ = 0;
-    control_.receive(bytes.data(), bytes.size());
+    control_.on_request(bytes.data(), bytes.size());
     control_.serve();
     if (joined_ == 0) return;
     ids_[client] = joined_;
@@ -277,7 +277,7 @@ class Conversation {
   void raw(Choices& choices) {
     std::vector<uint8_t> bytes(choices.byte());
     for (uint8_t& byte : bytes) byte = choices.byte();
-    control_.receive(bytes.data(), bytes.size());
+    control_.on_request(bytes.data(), bytes.size());
     control_.serve();
   }
 

@@ -129,7 +129,7 @@ class Talker : public Connection {
 
   explicit Talker(Given& given) : given_(given) {}
   ~Talker() override { given_.now -= has_; }
-  bool receive(std::span<const uint8_t>) override { return true; }
+  bool on_message(std::span<const uint8_t>) override { return true; }
   bool next(std::vector<uint8_t>& message, bool&) override {
     message.resize(message.size() + kSize);
     given_.now += !std::exchange(has_, true);
@@ -180,7 +180,7 @@ std::string heard_of(const FileHandle& from, const std::string& enough) {
 // Throws where it can.
 class Thrower : public Connection {
  public:
-  bool receive(std::span<const uint8_t>) override { throw std::bad_alloc(); }
+  bool on_message(std::span<const uint8_t>) override { throw std::bad_alloc(); }
   bool next(std::vector<uint8_t>&, bool&) override {
     if (std::exchange(greeted_, true)) throw std::bad_alloc();
     return false;

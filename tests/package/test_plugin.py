@@ -230,7 +230,7 @@ def test_echo_reads_lcm_files(prefix, project, ruedo):
     "text, words",
     [
         ("struct a_t { double x", "a.lcm:1: it ends within a type"),
-        ("struct a_t\n{ double x[n]; }", "a.lcm:2: the length 'n' of 'x' is no field before it"),
+        ("struct a_t\n{ double x[n]; }", "a.lcm:2: the length 'n' of 'x' is not a field before it"),
         ("struct a_t { b_t x; }", "'x' is of the type 'b_t', which is in no .lcm file"),
         ("struct a_t { a_t x; }", "the type 'a_t': it holds itself"),
     ],
@@ -390,7 +390,7 @@ def at_work_run(ruedo, at_work, mode, *options, code):
     "mode, code, words",
     [
         ("throw", 4, "no ?[31moven there"),
-        ("int", 4, "threw what is no std::exception"),
+        ("int", 4, "threw something other than a std::exception"),
         ("exit", 4, "ended the process"),
         ("terminate", 4, "ended the process by std::terminate()"),
         ("crash", -6, "crashed: SIGABRT"),
@@ -398,7 +398,7 @@ def at_work_run(ruedo, at_work, mode, *options, code):
         ("step", 4, "published for step 7777 in step 0"),
         ("late", 4, "channels are announced while the sensor is made, not later"),
         ("null", 4, "its kind made no sensor"),
-        ("name", 4, "'a b' is no name of a channel or a type: printable ASCII"),
+        ("name", 4, "'a b' is not a name of a channel or a type: printable ASCII"),
     ],
 )
 def test_what_a_plugin_does_wrong_at_work_is_one_line(ruedo, at_work, mode, code, words):
@@ -442,10 +442,10 @@ def bad(prefix, project):
         (
             "libplain.so",
             3,
-            "is no plugin of Ruedo: it was not linked with CMake's target ruedo::plugin",
+            "is not a plugin of Ruedo: it was not linked with CMake's target ruedo::plugin",
         ),
         ("libother.so", 3, "was built for another Ruedo"),
-        ("libtext.so", 3, "is no shared library"),
+        ("libtext.so", 3, "is not a shared library"),
         ("libcut.so", 3, "is a shared library whose end is missing"),
         ("libnone.so", 3, "there is no such plugin"),
         (".", 3, "is a folder; a file is needed"),

@@ -146,7 +146,7 @@ TEST(Rest, IsTheSameInACopy) {
   one.physics.exchange(writer);
   StateArchive reader(writer.written());
   other.physics.exchange(reader);
-  third.physics.take(one.physics);
+  third.physics.copy_from(one.physics);
   for (World* w : {&one, &other, &third}) {
     EXPECT_NEAR(load_of(*w, "b2/l"), 20.0, 1e-3);
     w->physics.set_twist(w->body("ball/l"), {{8, 0, 0}, {0, 0, 0}});

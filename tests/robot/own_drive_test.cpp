@@ -26,7 +26,7 @@ class Growing : public DriveModel {
 
 class Copied : public Growing {
  public:
-  bool take(const DriveModel& other) override {
+  bool copy_from(const DriveModel& other) override {
     *this = static_cast<const Copied&>(other);
     return true;
   }
@@ -48,11 +48,11 @@ TEST(OwnDrive, OneThatCannotBeCopiedIsNamed) {
   sim.velocity(0.3, 0.0);
   sim.run(0.5);
   try {
-    other.robots.take(sim.robots);
+    other.robots.copy_from(sim.robots);
     FAIL() << "it was taken";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("the drive of robot 'rover' is a plugin's that cannot be "
-                                        "copied: it lacks DriveModel::take()"));
+                                        "copied: it lacks DriveModel::copy_from()"));
   }
   const Vec3 before = sim.position();
   sim.velocity(0.3, 0.0);
@@ -64,8 +64,8 @@ TEST(OwnDrive, WhatFollowsInACopyIsWhatFollows) {
   Sim sim(world_of("test_copied")), other(world_of("test_copied"));
   sim.velocity(0.3, 0.2);
   sim.run(0.5);
-  other.physics.take(sim.physics);
-  other.robots.take(sim.robots);
+  other.physics.copy_from(sim.physics);
+  other.robots.copy_from(sim.robots);
   sim.run(0.4);
   other.run(0.4);
   EXPECT_GT(sim.position().x(), 0.15);

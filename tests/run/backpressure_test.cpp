@@ -31,40 +31,40 @@ TEST(Backpressure, LimitsNobodyBeforeTheFirstWord) {
 
 TEST(Backpressure, GoesThirtyMillisecondsAhead) {
   Backpressure pressure(5'000);
-  pressure.take({0, 1'000'000});
+  pressure.note_progress({0, 1'000'000});
   EXPECT_EQ(pressure.limits().at_any_rate, 206);  // 1.03 s
   EXPECT_EQ(pressure.limits().at_highest_rate, kFarAhead);
-  pressure.take({0, 1'000'000, 990'000});
+  pressure.note_progress({0, 1'000'000, 990'000});
   EXPECT_EQ(pressure.limits().at_any_rate, 206);
   EXPECT_EQ(pressure.limits().at_highest_rate, 201);  // 1.005 s
 }
 
 TEST(Backpressure, ALongStepIsAllowed) {
   Backpressure pressure(100'000);
-  pressure.take({0, 300'000, 300'000});
+  pressure.note_progress({0, 300'000, 300'000});
   EXPECT_EQ(pressure.limits().at_any_rate, 4);
   EXPECT_EQ(pressure.limits().at_highest_rate, 4);
 }
 
 TEST(Backpressure, WordsOfAnotherEpochCountForNothing) {
   Backpressure pressure(5'000);
-  pressure.take({0, 10'000'000});
+  pressure.note_progress({0, 10'000'000});
   pressure.begin(1, 0);
-  pressure.take({0, 10'000'000});
+  pressure.note_progress({0, 10'000'000});
   EXPECT_EQ(pressure.limits().at_any_rate, 6);
-  pressure.take({1, 5'000});
+  pressure.note_progress({1, 5'000});
   EXPECT_EQ(pressure.limits().at_any_rate, 7);
 }
 
 TEST(Backpressure, AMegabyteIsOnTheWay) {
   Backpressure pressure(5'000);
-  pressure.take({0, 0});
+  pressure.note_progress({0, 0});
   EXPECT_TRUE(pressure.has_room());
   pressure.published(10'000, 900'000);
   EXPECT_TRUE(pressure.has_room());
   pressure.published(20'000, 1'800'000);
   EXPECT_FALSE(pressure.has_room());
-  pressure.take({0, 10'000});
+  pressure.note_progress({0, 10'000});
   EXPECT_TRUE(pressure.has_room());
 }
 
@@ -74,10 +74,10 @@ class Launched : public testing::Test {
     RunOptions options = paused_server();
     options.rate = std::numeric_limits<double>::infinity();
     run_.begin(options, robot_sdf("r", 0, 0));
-    take({0, 0});
+    note_progress({0, 0});
     run_.ask(request_t::RESUME);
   }
-  void take(const LauncherProgress& progress) { run_.server().take(progress); }
+  void note_progress(const LauncherProgress& progress) { run_.server().note_progress(progress); }
   // The newest tick, once none that is newer has come for a while.
   SimTime stands_at() {
     SimTime last = -1;
@@ -97,11 +97,11 @@ class Launched : public testing::Test {
 
 TEST_F(Launched, WaitsAndGoesOn) {
   EXPECT_EQ(stands_at(), 30'000);
-  take({0, 30'000});
+  note_progress({0, 30'000});
   EXPECT_EQ(stands_at(), 60'000);
-  take({0, 1'000'000, 500'000});  // it works with what it knew at 0.5 s
+  note_progress({0, 1'000'000, 500'000});  // it works with what it knew at 0.5 s
   EXPECT_EQ(stands_at(), 515'000);
-  take({0, 1'000'000});
+  note_progress({0, 1'000'000});
   EXPECT_EQ(stands_at(), 1'030'000);
 }
 
@@ -113,18 +113,18 @@ TEST_F(Launched, TicksAreRepeatedWhileItWaits) {
 }
 
 TEST_F(Launched, AnEpochBeginsAtItsBeginning) {
-  take({0, 1'000'000});
+  note_progress({0, 1'000'000});
   stands_at();
   run_.reset(reset_request_t::ALL);
   run_.bus.forget();
-  take({0, 1'000'000});  // written before it knew
+  note_progress({0, 1'000'000});  // written before it knew
   EXPECT_EQ(stands_at(), 30'000);
 }
 
 TEST_F(Launched, APausedRunIsSteppedAsFarAsItMayGo) {
   stands_at();
   run_.ask(request_t::PAUSE);
-  take({0, 1'000'000});
+  note_progress({0, 1'000'000});
   EXPECT_EQ(run_.step(100).step, 106);
 }
 

@@ -23,7 +23,7 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   simulation.start(pacer);
   int64_t last = -1;
   const auto take = [&] {
-    while (const engine::Batch* batch = simulation.take()) {
+    while (const engine::Batch* batch = simulation.next_batch()) {
       for (int i = 0; i < batch->count; ++i) {
         const Snapshot& snapshot = batch->snapshots[i];
         EXPECT_EQ(snapshot.step, ++last);
@@ -63,7 +63,7 @@ TEST(BrokenState, NobodyGoesOnWithoutARenderer) {
   simulation.start(pacer);
   int64_t last = -1;
   while (last < 9) {
-    if (const engine::Batch* batch = simulation.take())
+    if (const engine::Batch* batch = simulation.next_batch())
       last += batch->count;
     else
       wakeup.wait();

@@ -76,7 +76,7 @@ struct Alone {
     request.body = body;
     request.size = static_cast<int32_t>(body.size());
     const std::vector<uint8_t> bytes = engine::encoded(request);
-    control.receive(bytes.data(), bytes.size());
+    control.on_request(bytes.data(), bytes.size());
     control.serve();
   }
   // Clients that join, ask for as much as one may, and leave.

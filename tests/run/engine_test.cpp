@@ -201,7 +201,7 @@ TEST(Engine, ASensorThatCannotBeCopiedIsNamed) {
     FAIL() << "it was saved";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("the device 'a/S' is a plugin's that cannot be "
-                                                 "copied: it lacks Sensor::take()"));
+                                                 "copied: it lacks Sensor::copy_from()"));
   }
   EXPECT_EQ(engine.state_hash(0), before);
 }
@@ -385,11 +385,11 @@ TEST(Engine, SaysWhatCannotBe) {
           "no robot has a device 'lrf'; there are a/collisions, a/motion, a/odometry, a/pose"));
   EXPECT_THAT(
       message([&] { engine.observe("pose", "position"); }),
-      testing::HasSubstr("'position' is no field of numbers in pose_t; there are utime, pos,"));
+      testing::HasSubstr("'position' is not a field of numbers in pose_t; there are utime, pos,"));
   EXPECT_THAT(message([&] { engine.command(0, "a/pose", {}); }),
               testing::HasSubstr("no robot takes commands on 'a/pose'"));
   EXPECT_THAT(message([&] { engine.command(0, "a/velocity", {}); }),
-              testing::HasSubstr("no message for a/velocity"));
+              testing::HasSubstr("the message does not decode as the type of a/velocity"));
   const double two[] = {0, 0};
   EXPECT_THAT(message([&] { engine.drive(two); }), testing::HasSubstr("1 rows of 3"));
   options.worlds = 0;

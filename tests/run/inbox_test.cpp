@@ -32,7 +32,7 @@ class InboxTest : public testing::Test {
   }
   void receive(double vx) {
     const auto bytes = velocity(vx);
-    inbox_.receive("r/velocity", bytes.data(), bytes.size());
+    inbox_.put("r/velocity", bytes.data(), bytes.size());
   }
   // The speeds of the commands that act on that state, in their order.
   std::vector<double> apply(int64_t step) {
@@ -109,7 +109,7 @@ TEST_F(InboxTest, TakesNothingLarge) {
   for (const uint64_t refused : {0, 1}) {
     command.rate.resize(static_cast<size_t>(command.n));
     const auto bytes = engine::encoded(command);
-    wheels.receive("r/wheels", bytes.data(), bytes.size());
+    wheels.put("r/wheels", bytes.data(), bytes.size());
     EXPECT_EQ(wheels.refused(), refused) << bytes.size();
     command.n = 8200;  // more than 64 kB
   }
@@ -131,7 +131,7 @@ TEST_F(InboxTest, APrimitiveThatIsSentAgainIsTakenOnce) {
     command.kind = move_command_t::ADVANCE;
     command.value = value;
     const auto bytes = engine::encoded(command);
-    inbox.receive("r/move", bytes.data(), bytes.size());
+    inbox.put("r/move", bytes.data(), bytes.size());
   };
   const auto applied = [&](int64_t step) {
     batch_.applied_count = 0;

@@ -66,12 +66,12 @@ TEST(Markers, EachFaultIsNamed) {
       {[](markers_t& m) { m.markers[0].color[3] = 1.5f; },
        "marker 0: color 1.5 is not from 0 to 1"},
       {[](markers_t& m) { m.markers[0].orientation[0] = 0.0; },
-       "marker 0: orientation is no unit quaternion w, x, y, z"},
+       "marker 0: orientation is not a unit quaternion w, x, y, z"},
       {[](markers_t& m) { m.markers[0].position[1] = kNan; },
        "marker 0: position nan is not within 1e+06 m"},
       {[](markers_t& m) { m.markers[0].points = {{0, 0, static_cast<float>(kNan)}}; },
        "marker 0: point nan is not within 1e+06 m"},
-      {[](markers_t& m) { m.markers[0].n = 3; }, "marker 0: 3 points are no pairs"},
+      {[](markers_t& m) { m.markers[0].n = 3; }, "marker 0: 3 points do not make pairs"},
       {[](markers_t& m) {
          m.markers[0].kind = marker_t::TEXT;
          m.markers[0].text = std::string(1001, 'x');
@@ -82,7 +82,7 @@ TEST(Markers, EachFaultIsNamed) {
          m.markers[0].columns = 2;
          m.markers[0].ncells = 3;
        },
-       "marker 0: 3 cells are no rows of 2 columns"},
+       "marker 0: 3 cells do not fill rows of 2 columns"},
       {[](markers_t& m) {
          m.markers[0].kind = marker_t::MAP;
          m.markers[0].columns = m.markers[0].ncells = 1;
@@ -107,18 +107,18 @@ TEST(Markers, TheInboxTakesWholeOnesAlone) {
   CommandInbox inbox({{"ruedo/markers", RobotIndex(), Input::Kind::markers}}, 0);
   markers_t markers = layer_with(marker_of(marker_t::POINTS));
   const auto good = bytes_of(markers);
-  inbox.receive("ruedo/markers", good.data(), good.size());
+  inbox.put("ruedo/markers", good.data(), good.size());
   EXPECT_EQ(inbox.refused(), 0u);
   markers.markers[0].size = -1;
   const auto bad = bytes_of(markers);
-  inbox.receive("ruedo/markers", bad.data(), bad.size());
+  inbox.put("ruedo/markers", bad.data(), bad.size());
   EXPECT_EQ(inbox.refused(), 1u);
   EXPECT_EQ(inbox.schedule(3, InputIndex(0), bad.data(), bad.size()),
             CommandInbox::Scheduled::faulty);
   EXPECT_EQ(inbox.schedule(3, InputIndex(0), good.data(), good.size()),
             CommandInbox::Scheduled::kept);
   for (size_t i = 0; i < CommandInbox::kKeptOfWorld; ++i)
-    inbox.receive("ruedo/markers", good.data(), good.size());
+    inbox.put("ruedo/markers", good.data(), good.size());
   EXPECT_EQ(inbox.displaced(), 1u);  // the oldest of them, no robot's command
 }
 

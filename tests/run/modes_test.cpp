@@ -86,7 +86,7 @@ TEST(Live, GoesOnByItself) {
   live.begin(world.stage(), -1);
   EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
   EXPECT_TRUE(live.has_room() && live.state_comes() && !live.takes_grants());
-  EXPECT_FALSE(live.receive("r/velocity", nullptr, 0));  // it acts when it comes
+  EXPECT_FALSE(live.on_message("r/velocity", nullptr, 0));  // it acts when it comes
   EXPECT_EQ(live.attend({}, 0, kStart).next, Mode::Time::max());
   EXPECT_EQ(live.turn(0).what, Mode::Turn::What::nothing);
   EXPECT_EQ(live.refusal(request_t::RESET, false), "");
@@ -98,9 +98,9 @@ TEST(Live, WaitsForTheMessagesOfAChannel) {
   live.begin(world.stage(), -1);
   EXPECT_EQ(world.gate.limit, 0);  // message 0 acts on state 0, message k on state 20 k
   const std::vector<uint8_t> command = forward();
-  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_TRUE(live.on_message("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 20);
-  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_TRUE(live.on_message("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 40);
   EXPECT_THAT(live.waits_for(40), testing::HasSubstr("message 2 on r/velocity"));
   EXPECT_EQ(live.waits_for(39), "");
@@ -113,16 +113,16 @@ TEST(Live, WaitsForNoRobotThatIsGone) {
   Live live({{"r/velocity", {10, 1}}}, kStep_us);
   live.begin(world.stage(), -1);
   const std::vector<uint8_t> command = forward();
-  live.receive("r/velocity", command.data(), command.size());
+  live.on_message("r/velocity", command.data(), command.size());
   world.remove_robot();
   live.models_changed(world.stage(), 13);
   EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
   EXPECT_EQ(live.waits_for(40), "");
-  EXPECT_FALSE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_FALSE(live.on_message("r/velocity", command.data(), command.size()));
   world.add_robot("r");
   live.models_changed(world.stage(), 30);
   EXPECT_EQ(world.gate.limit, 40);
-  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_TRUE(live.on_message("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 60);
   EXPECT_THAT(world.apply(60), testing::ElementsAre("r/velocity"));
 }
@@ -132,7 +132,7 @@ TEST(Live, CountsOnForARobotThatStays) {
   Live live({{"r/velocity", {10, 1}}}, kStep_us);
   live.begin(world.stage(), -1);
   const std::vector<uint8_t> command = forward();
-  for (int k = 0; k < 3; ++k) live.receive("r/velocity", command.data(), command.size());
+  for (int k = 0; k < 3; ++k) live.on_message("r/velocity", command.data(), command.size());
   live.models_changed(world.stage(), 0);
   EXPECT_EQ(world.gate.limit, 60);
 }
@@ -502,7 +502,7 @@ TEST_F(RepeatingTest, IsNotDisturbed) {
   Repeating repeating(file_.path(), &after);
   repeating.begin(world_.stage(), -1);
   const std::vector<uint8_t> command = forward();
-  EXPECT_TRUE(repeating.receive("r/velocity", command.data(), command.size()));  // and ignored
+  EXPECT_TRUE(repeating.on_message("r/velocity", command.data(), command.size()));  // and ignored
   EXPECT_NE(repeating.refusal(request_t::SPAWN, false), "");
   EXPECT_EQ(repeating.refusal(request_t::GET_STATE, true), "");
   repeating.turn(-1);

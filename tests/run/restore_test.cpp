@@ -441,7 +441,7 @@ TEST_F(RestoreTest, WhatIsTooFarOrBreaksOffIsRefusedBeforeAnythingChanges) {
             " steps from its beginning; RESTORE goes 1000000000 at most");
   }
   fs::resize_file(file("far"), fs::file_size(file("far")) - 1);
-  refused("far.snapshot: is no snapshot: cut off in the event that begins at byte ");
+  refused("far.snapshot: is not a snapshot: cut off in the event that begins at byte ");
   end();
   EXPECT_EQ(length_of(log.path()).steps, 100) << "the log has no reset that was none";
 }

@@ -161,7 +161,7 @@ TEST(Run, TakesCommandsFromASink) {
   Driver driver([&] {
     velocity_command_t command{};
     command.vx = 0.5;
-    server.receive("r/velocity", engine::encoded(command));
+    server.on_message("r/velocity", engine::encoded(command));
   });
   QueuedSink queue(driver, {.thread = "driver"});
   server.add(queue);

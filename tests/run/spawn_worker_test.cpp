@@ -106,7 +106,7 @@ TEST(SpawnWorker, OneIsReadyAtATime) {
       ready.wait();
       std::this_thread::sleep_for(std::chrono::milliseconds(50));  // the next one could begin
       ++taken;
-      ASSERT_TRUE(worker.take());
+      ASSERT_TRUE(worker.take_made());
     }
   }
   EXPECT_EQ(taken_before, (std::vector<int>{0, 1, 2}));

@@ -52,10 +52,10 @@ TEST(StallWatch, TellsOnceWhoIsWaitedFor) {
 class Told {
  public:
   // slow: what a slow machine may be told of first.
-  explicit Told(std::string slow = "this process was held up") : slow_(std::move(slow)) {}
+  explicit Told(std::string slow = "this process did not run") : slow_(std::move(slow)) {}
   // Whether it is about the run: before that, a loaded machine may have held this process up.
   bool tell(const std::string& reason) {
-    if (reason.starts_with("this process was held up") || reason.starts_with(slow_)) return false;
+    if (reason.starts_with("this process did not run") || reason.starts_with(slow_)) return false;
     const std::lock_guard lock(mutex_);
     reason_ = reason;
     changed_.notify_all();

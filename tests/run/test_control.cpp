@@ -361,7 +361,7 @@ TEST(Control, FewRequestsWait) {
     asked.body.assign(body, 0);
     asked.size = static_cast<int32_t>(body);
     const std::vector<uint8_t> bytes = engine::encoded(asked);
-    for (size_t i = 0; i < times; ++i) EXPECT_TRUE(control.receive(bytes.data(), bytes.size()));
+    for (size_t i = 0; i < times; ++i) EXPECT_TRUE(control.on_request(bytes.data(), bytes.size()));
     control.serve();
     return std::exchange(executed, 0);
   };
@@ -399,7 +399,7 @@ TEST(Control, WaitsForTheFirstState) {
     request.size = static_cast<int32_t>(body.size());
     ++request.sequence;
     const std::vector<uint8_t> bytes = engine::encoded(request);
-    EXPECT_TRUE(control.receive(bytes.data(), bytes.size()));
+    EXPECT_TRUE(control.on_request(bytes.data(), bytes.size()));
   };
   join_t joining;
   joining.client = "early";

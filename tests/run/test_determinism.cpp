@@ -106,7 +106,7 @@ std::string log_of(const std::shared_ptr<const world::WorldModel>& world,
   velocity_command_t command{};
   command.vx = 0.4;
   command.omega = 0.3;
-  server.receive(world->models[1].name + "/velocity", engine::encoded(command));
+  server.on_message(world->models[1].name + "/velocity", engine::encoded(command));
   server.run();
   return file.bytes();
 }

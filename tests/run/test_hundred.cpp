@@ -49,7 +49,7 @@ void drive_circles(run::Run& server, int robots) {
   command.radius = 1.0;
   command.speed = 0.4;
   for (int i = 0; i < robots; ++i)
-    server.receive("r" + std::to_string(i) + "/move", engine::encoded(command));
+    server.on_message("r" + std::to_string(i) + "/move", engine::encoded(command));
 }
 
 RunOptions options_for(const Fleet& fleet, double seconds) {
@@ -87,7 +87,7 @@ void drive_into_walls(run::Run& server, int robots) {
   command.value = 1e6;
   command.speed = 0.4;
   for (int i = 0; i < robots; ++i)
-    server.receive("r" + std::to_string(i) + "/move", engine::encoded(command));
+    server.on_message("r" + std::to_string(i) + "/move", engine::encoded(command));
 }
 
 // operator new in 1 000 steps, from 5 s to 10 s of sim time, counted between two messages that only

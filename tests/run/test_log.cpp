@@ -140,7 +140,7 @@ TEST(Recording, HoldsWhatARepetitionNeeds) {
   command.vx = 0.3;
   {
     run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
-    server.receive("r/velocity", engine::encoded(command));
+    server.on_message("r/velocity", engine::encoded(command));
     server.run();
   }
   lcm::LogFile log(file.path(), "r");

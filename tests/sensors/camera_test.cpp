@@ -23,7 +23,7 @@
 #include "sensor_bench.h"
 #include "sensors/camera_lens.h"
 #include "sensors/pixel_noise.h"
-#include "world/read/document.h"
+#include "world/document/document.h"
 
 namespace ruedo {
 namespace {

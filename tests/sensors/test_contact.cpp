@@ -151,7 +151,8 @@ TEST(ContactSensor, NamesOfTheConverterOfUrdf) {
 TEST(ContactSensor, AShapeThatIsNotThereIsToldAndTheLinkCounts) {
   Bench bench("<contact><collision>middle</collision></contact>");
   ASSERT_EQ(bench.bench.findings.list().size(), 1u);
-  EXPECT_THAT(bench.bench.findings.list()[0].text, testing::HasSubstr("'middle' is no collision"));
+  EXPECT_THAT(bench.bench.findings.list()[0].text,
+              testing::HasSubstr("'middle' is not a collision"));
   EXPECT_TRUE(bench.with({touch(kBumper, kBox, 0)}).pressed);
   EXPECT_TRUE(
       Bench("<contact><collision>__default__</collision></contact>").bench.findings.list().empty());

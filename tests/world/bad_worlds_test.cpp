@@ -68,14 +68,14 @@ const std::vector<BadWorld>& table() {
       {"Zeroes", std::string("<sdf\0>", 6), ":1: not a text file: it holds zero bytes"},
       {"NotUtf8", "<sdf version='1.9'>\n<world name='w\xE9'/></sdf>",
        ":2: text that is not UTF-8; save the file as UTF-8"},
-      {"Html", "<html/>", ":1: <html>: is no SDF: the root element is not <sdf>"},
+      {"Html", "<html/>", ":1: <html>: is not SDF: the root element is not <sdf>"},
       {"OldGazebo", "<gazebo version='1.2'/>",
        ":1: <gazebo>: this is the format of Gazebo before 1.0; Ruedo reads SDF 1.4 to 1.12 (gz sdf "
        "-p converts it)"},
       {"NoVersion", "<sdf/>",
        ":1: <sdf>: has no version; the attribute version is required, as in version=\"1.9\""},
       {"BadVersion", "<sdf version='new'/>",
-       ":1: <sdf>: version 'new' is no version; allowed are 1.4 to 1.12"},
+       ":1: <sdf>: version 'new' is not a version; allowed are 1.4 to 1.12"},
       {"TooOld", "<sdf version='1.0'/>",
        ":1: <sdf>: version '1.0' is too old; allowed are 1.4 to 1.12"},
       {"OtherMajor", "<sdf version='2.0'/>",
@@ -172,7 +172,7 @@ const std::vector<BadWorld>& table() {
       {"UnknownPlacementFrame",
        "<sdf version='1.9'>\n<world name='w'><model name='m' placement_frame='x'><link "
        "name='base'/></model></world></sdf>",
-       ":2: <model>: placement_frame 'x' is no frame of the model 'm'", "the model is left out"},
+       ":2: <model>: placement_frame 'x' is not a frame of the model 'm'", "the model is left out"},
       // Joints.
       {"JointWithoutType", joint("<joint name='j'><parent>a</parent><child>b</child></joint>"),
        ":5: <joint>: has no type", "the joint is left out"},

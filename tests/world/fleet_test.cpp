@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "temporary_folder.h"
+#include "world/drives/placement.h"
 #include "world/load.h"
-#include "world/model/placement.h"
 
 namespace ruedo::world {
 namespace {

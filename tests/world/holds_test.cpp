@@ -47,12 +47,13 @@ TEST(Holds, WhatIsNotThereIsNamed) {
       "<plugin filename='f' name='gz::sim::systems::DetachableJoint'><parent_link>a</parent_link>"
       "</plugin></model>" +
       kBox);
-  EXPECT_THAT(texts(*world),
-              ElementsAre("<plugin>: DetachableJoint: <parent_link> 'c' is no link of the model; "
-                          "it holds nothing",
-                          "<plugin>: DetachableJoint has no <child_model>; it holds nothing",
-                          "DetachableJoint: the world has no model 'bax'; it is held when it comes",
-                          "DetachableJoint: the model 'box' has no link 'k'; nothing is held"));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre("<plugin>: DetachableJoint: <parent_link> 'c' is not a link of the model; "
+                  "it holds nothing",
+                  "<plugin>: DetachableJoint has no <child_model>; it holds nothing",
+                  "DetachableJoint: the world has no model 'bax'; it is held when it comes",
+                  "DetachableJoint: the model 'box' has no link 'k'; nothing is held"));
 }
 
 TEST(Holds, OfWhatCannotBeHeldIsNamed) {

@@ -295,7 +295,7 @@ turn_controller:
   EXPECT_EQ(axis(*world, 0).position_pid.value().d, 50.0);
   EXPECT_EQ(axis(*world, 1).position_gain, 7.0);
   EXPECT_THAT(texts(*world), ElementsAre("controller 'arm_controller': gains of the joint 'three', "
-                                         "which is none of its joints"));
+                                         "which is not one of its joints"));
 }
 
 TEST(RosGains, OfPidControllersAndConstraintsThatAreNamed) {

@@ -233,7 +233,7 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
   EXPECT_EQ(error("a.yaml", "image: none.pgm\nresolution: 1\norigin: [0, 0, 0]\n"),
             "none.pgm: no such file");
   EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"),
-            "no.png: it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+            "no.png: it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)");
   const std::string good = "image: ok.pgm\nresolution: 1\norigin: [0, 0, 0]\n";
   EXPECT_EQ(error("a.yaml", "\xEF\xBB\xBF" + good), "");  // as editors of Windows begin a text
   EXPECT_EQ(error("a.yaml", good + "resolution: 2\n"),
@@ -244,9 +244,9 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
             "a.yaml:4: occupied_thresh: '65' is not allowed; allowed is 0 to 1");
   EXPECT_EQ(error("a.yaml", good + "free_thresh: -1\n"),
             "a.yaml:4: free_thresh: '-1' is not allowed; allowed is 0 to 1");
-  EXPECT_EQ(error("a.yaml", "hello\n"), "a.yaml:1: 'hello' is no 'key: value'");
+  EXPECT_EQ(error("a.yaml", "hello\n"), "a.yaml:1: 'hello' is not a 'key: value'");
   EXPECT_EQ(error("a.map", "hello\n"),
-            "a.map:1: is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
+            "a.map:1: is not a map of MobileSim and ARIA: it does not begin with '2D-Map'");
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3\n"),
             "a.map:3: '1 2 3' is not allowed; allowed are x1 y1 x2 y2, in mm");
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3 x\n"), "a.map:3: LINES: 'x' is not a number");
@@ -334,10 +334,10 @@ TEST(Map, WhatYamlAllows) {
   EXPECT_EQ(grid.x, 1);
   EXPECT_EQ(drawn(grid), ".\n");
   ASSERT_EQ(findings.list().size(), 2u);  // in the order of the keys
-  EXPECT_EQ(findings.list()[0].text, "is no key of map_server's, and ignored");
+  EXPECT_EQ(findings.list()[0].text, "is not a key of map_server's, and ignored");
   EXPECT_EQ(findings.list()[1].source.line, 5);
   EXPECT_EQ(findings.list()[1].text,
-            "is no key of map_server's, and ignored; did you mean occupied_thresh?");
+            "is not a key of map_server's, and ignored; did you mean occupied_thresh?");
 }
 
 }  // namespace

@@ -411,7 +411,8 @@ TEST_F(Meshes, ImporterThatEatsMemoryIsStopped) {
   std::string many = ply();
   many.replace(many.find("element vertex ") + 15, 0, "99999999");
   EXPECT_EQ(fault_of(folder.write("many.ply", many), import()),
-            "it needs more memory than is allowed");
+            "importing its 0.0 MB needs more than the 3.0 GiB of memory that an importer may use; "
+            "reduce it to about 2 000 000 triangles, or split it into several files");
 }
 #endif
 
@@ -419,8 +420,9 @@ TEST_F(Meshes, MalformedFilesAreFaults) {
   EXPECT_NE(fault_of(folder.write("empty.obj", ""), import()), "");
   EXPECT_NE(fault_of(folder.write("text.dae", "hello"), import()), "");
   EXPECT_NE(fault_of(folder.write("text.glb", "hello"), import()), "");
-  EXPECT_EQ(fault_of(folder.write("box.blend", "hello"), import()),
-            "'.blend' is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
+  EXPECT_EQ(
+      fault_of(folder.write("box.blend", "hello"), import()),
+      "'.blend' is not a known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
   std::string far = stl();
   far.replace(far.find("vertex 0.0"), 15, "vertex 1e30 0 0");
   EXPECT_NE(fault_of(folder.write("far.stl", far), import()), "");
@@ -553,7 +555,7 @@ TEST(Pictures, TooLargeByTheirHeads) {
       .replace(22, 4, std::string("\xA0\x15\xFF\xFF", 4));  // -60000: from the top
   EXPECT_EQ(picture_fault(bmp, 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
   EXPECT_EQ(picture_fault(std::string("hello"), 1000),
-            "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+            "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)");
 }
 
 // A decoder takes the bytes of a portable map as they are: white would be grey.

@@ -310,7 +310,7 @@ TEST(OddValuesOfUrdf, MimicOfRos2Control) {
   EXPECT_EQ(k.mimic_multiplier, -2.0);
   EXPECT_EQ(k.mimic_offset, 0.5);
   EXPECT_THAT(texts(*follows("x", "")),
-              ElementsAre("<mimic>: joint 'x' is none of the model's joints; the joint moves on "
+              ElementsAre("<mimic>: joint 'x' is not one of the model's joints; the joint moves on "
                           "its own"));
   EXPECT_THAT(texts(*follows("x", "<mimic joint='j'/>")),
               ElementsAre("its param mimic is left out: by its <mimic> it follows 'j'"));

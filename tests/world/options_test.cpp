@@ -5,9 +5,9 @@
 
 #include "ruedo/sensor.h"
 #include "temporary_folder.h"
+#include "world/drives/placement.h"
 #include "world/load.h"
 #include "world/model/convex.h"
-#include "world/model/placement.h"
 
 namespace ruedo::world {
 namespace {

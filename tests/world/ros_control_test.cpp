@@ -5,10 +5,10 @@
 
 #include "temporary_folder.h"
 #include "text_world.h"
+#include "world/document/controller_files.h"
+#include "world/document/yaml.h"
 #include "world/load.h"
 #include "world/model/body_layout.h"
-#include "world/read/controller_files.h"
-#include "world/read/yaml.h"
 
 namespace ruedo::world {
 namespace {
@@ -422,11 +422,11 @@ TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
       {"publish_rate: 50.0", "publish_rate: -50.0", "<publish_rate>: '-50.0' is not allowed", true},
       {"publish_rate: 50.0", "publish_rate: fast", "<publish_rate>: 'fast' is not a number", true},
       {"publish_rate: 50.0", "publish_rate: 33.33333333333333", "it is 33.333333333", true},
-      {"publish_rate: 50.0", "publish_rate: 1e9", "it is 1e+06", true},
+      {"publish_rate: 50.0", "publish_rate: 1e9", "it is 1000000", true},
       {"joints: [front_left]", "joints: [nope]",
        "controller 'hold' names the joint 'nope', which the model does not have", true},
       {"gains: {front_left", "gains: {other",
-       "controller 'hold': gains of the joint 'other', which is none of its joints", true},
+       "controller 'hold': gains of the joint 'other', which is not one of its joints", true},
       {"{p: 10", "{pp: 10", "gains of the joint 'front_left': without effect here: pp", true},
       {"i_clamp: 1.0", "i_clamp_min: 5, i_clamp_max: -5",
        "gains of the joint 'front_left': i_clamp_min '5' is above 0; it counts as 0", true},
@@ -485,7 +485,7 @@ TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
                                   std::string("\1\2"), std::string("a: {b: 1}\n"), kBase})
     EXPECT_THAT(texts(*named_world(text)),
                 testing::Contains(testing::AnyOf(HasSubstr("holds no controller with a type"),
-                                                 HasSubstr("is no YAML"))))
+                                                 HasSubstr("is not YAML"))))
         << text;
   const std::string broadcaster =
       "m:\n  ros__parameters:\n    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";

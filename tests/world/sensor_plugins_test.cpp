@@ -111,7 +111,7 @@ TEST(SensorPlugins, AForceTorqueSensorIsInItsJoint) {
   EXPECT_EQ(sensor.joint, 0);
   EXPECT_EQ(sensor.link, 1);
   EXPECT_THAT(texts(*with("libgazebo_ros_ft_sensor.so", "<jointName>k</jointName>")),
-              ElementsAre(HasSubstr("'k' is no joint")));
+              ElementsAre(HasSubstr("'k' is not a joint")));
 }
 
 TEST(SensorPlugins, WhatDoesNotActOrIsWrongIsNamed) {

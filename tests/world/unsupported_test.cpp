@@ -167,7 +167,7 @@ TEST(Mimic, APluginOfClassicSaysWhoLeads) {
   EXPECT_EQ(k.mimic_offset, 0.2);
   EXPECT_THAT(world("k")->findings.at(0).text, testing::HasSubstr("a joint cannot follow itself"));
   EXPECT_THAT(world("l")->findings.at(0).text,
-              testing::HasSubstr("'l' is none of the model's joints"));
+              testing::HasSubstr("'l' is not one of the model's joints"));
 }
 
 // A leader that does not exist, or that follows its own follower, is an error; the joint then moves
@@ -184,7 +184,7 @@ TEST(Mimic, NobodyFollowsNobodyOrItself) {
     EXPECT_EQ(world->models.at(0).model->joints.at(0).leader, -1);
     return world->findings[0].text;
   };
-  EXPECT_THAT(finding("k"), testing::HasSubstr("joint 'k' is none of the model's joints"));
+  EXPECT_THAT(finding("k"), testing::HasSubstr("joint 'k' is not one of the model's joints"));
   EXPECT_THAT(finding("j"), testing::HasSubstr("cannot follow itself"));
 }
 

@@ -5,8 +5,8 @@
 
 #include <random>
 
-#include "world/read/document.h"
-#include "world/read/xml_text.h"
+#include "world/document/document.h"
+#include "world/document/xml_text.h"
 
 namespace ruedo::world {
 namespace {

@@ -63,7 +63,7 @@ describe("a message that is written", () => {
   it.each([
     [{ ...drive, vx: "fast" }, "vx is a number"],
     [{ ...drive, utime: 0.5 }, "utime is a whole number"],
-    [{ ...drive, speed: 1 }, "speed is none of utime, vx, vy, omega"],
+    [{ ...drive, speed: 1 }, "speed is not one of utime, vx, vy, omega"],
     [{ utime: 0, vx: 0, vy: 0 }, "omega is missing"],
     [[1], "velocity_command_t is an object"],
   ])("%j is refused", (value, words) => {

@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "transport/forked.h"
 #include "ruedo/client.h"
+#include "transport/forked.h"
 
 namespace ruedo::client {
 namespace {
@@ -50,7 +50,7 @@ std::string text_of(const std::exception_ptr& fault) {
   } catch (const std::exception& error) {
     return error.what();
   } catch (...) {
-    return "what it threw is no std::exception";
+    return "it threw something other than a std::exception";
   }
 }
 

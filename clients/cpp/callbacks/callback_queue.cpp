@@ -99,8 +99,8 @@ std::deque<CallbackQueue::State::Waiting> CallbackQueue::State::drop() {
   waiting = std::move(kept);
   if (!dropped.empty() && !std::exchange(told, true)) {
     std::fputs(
-        "ruedo: callbacks are slower than their samples come: they get the newest of each channel "
-        "alone, and the streams' dropped() counts the others (this is said once)\n",
+        "ruedo: callbacks are slower than their samples: they get only the newest sample of each "
+        "channel, and dropped() of each stream counts the others (shown once)\n",
         stderr);
   }
   return dropped;

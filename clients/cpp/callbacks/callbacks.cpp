@@ -77,8 +77,7 @@ void say_awaited(const std::string& what) {
 
 void CallbackCore::fail(const std::exception_ptr& fault) {
   if ((faults_ && faults_->keep(fault, what_)) || std::exchange(failed_, true)) return;
-  std::fprintf(stderr,
-               "ruedo: a callback on %s failed: %s; it is called on, and this is said once\n",
+  std::fprintf(stderr, "ruedo: a callback on %s failed: %s; it stays subscribed (shown once)\n",
                what_.c_str(), text_of(fault).c_str());
 }
 

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "callbacks/callback_faults.h"
-#include "transport/forked.h"
 #include "ruedo/client.h"
+#include "transport/forked.h"
 
 namespace ruedo::client {
 

@@ -133,7 +133,7 @@ void Engine::command(int world, const std::string& channel, const std::vector<ui
 Observation Engine::observe(const std::string& name) {
   const size_t dot = name.rfind('.');
   if (dot == std::string::npos || dot == 0 || dot + 1 == name.size())
-    throw InputError({}, "'" + name + "' is no DEVICE.FIELD; for example 'lrf.ranges'");
+    throw InputError({}, "'" + name + "' is not a DEVICE.FIELD; for example 'lrf.ranges'");
   const auto array = impl_->copies.observe(name.substr(0, dot), name.substr(dot + 1));
   Observation made;
   made.type_ = type_of(array->type);

@@ -113,7 +113,7 @@ void Stepper::take_part(Duration timeout) {
       throw WireError("nobody stands there");
   } catch (const WireError& error) {
     throw TypeMismatch(
-        std::string("the reply to GRANT is no grant_reply_t of this client's version: ") +
+        std::string("the reply to GRANT is not a grant_reply_t of this client's version: ") +
         error.what());
   }
   run_id_ = core_.info()->run_id;

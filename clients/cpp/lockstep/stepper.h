@@ -16,9 +16,9 @@
 #include <utility>
 #include <vector>
 
-#include "transport/channel_names.h"
 #include "ruedo/client.h"
 #include "session.h"
+#include "transport/channel_names.h"
 
 namespace ruedo::client {
 

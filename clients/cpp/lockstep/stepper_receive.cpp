@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "core.h"
+#include "lockstep/stepper.h"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/tick_t.hpp"
-#include "lockstep/stepper.h"
 #include "samples/wire_reader.h"
 #include "samples/world_info.h"
 

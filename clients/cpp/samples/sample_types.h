@@ -53,7 +53,8 @@ SampleType decoded(const std::string& channel, const std::vector<uint8_t>& bytes
     if (in.int64() == decoder.fingerprint)
       return static_cast<const SampleType&>(*decoder.decode(in));
   } catch (const WireError& error) {
-    throw TypeMismatch(channel + ": a message is no valid " + decoder.type + ": " + error.what());
+    throw TypeMismatch(channel + ": a message is not a valid " + decoder.type + ": " +
+                       error.what());
   }
   throw TypeMismatch(channel + " carries another type than " + decoder.type +
                      ", or another version of it");

@@ -104,13 +104,13 @@ void read_part(WireReader& in, WorldInfo& info) {
   }
 }
 
+}  // namespace
+
 std::string hex(int64_t fingerprint) {
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(fingerprint));
   return text;
 }
-
-}  // namespace
 
 const RobotInfo* WorldInfo::robot(const std::string& name) const {
   const auto found = robot_index.find(name);
@@ -159,7 +159,7 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
     }
   } catch (const WireError& error) {
     parts_.clear();
-    throw TypeMismatch(std::string("a message on ruedo/info is no valid world_info_t: ") +
+    throw TypeMismatch(std::string("a message on ruedo/info is not a valid world_info_t: ") +
                        error.what());
   }
   for (size_t i = 0; i < info->robots.size(); ++i)

@@ -39,6 +39,9 @@ struct WorldInfo {
   const RobotInfo* robot(const std::string& name) const;
 };
 
+// A type's fingerprint as lcm-gen's sources write it, without the 0x.
+std::string hex(int64_t fingerprint);
+
 // Of a world_info_t; nothing where it is none that this client reads.
 std::optional<int64_t> run_id_of(const uint8_t* bytes, size_t size);
 

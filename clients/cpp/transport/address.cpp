@@ -72,7 +72,7 @@ void check_reachable(const std::string& url) {
     throw NoServer(url +
                    ": this machine has no route for multicast. On Linux: sudo ip route add "
                    "224.0.0.0/4 dev lo; "
-                   "`ruedo doctor` tells more");
+                   "`ruedo doctor` explains");
   }
   if (address.scheme == "tcpq") {
     if (bus::connect_tcp(address.host, std::to_string(address.port), why)) return;

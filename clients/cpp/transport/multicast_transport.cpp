@@ -48,7 +48,7 @@ bool MulticastTransport::receive(std::chrono::milliseconds timeout, const Receiv
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {
     busy_ = true;
-    const bool any = receiver_->take(receiver);
+    const bool any = receiver_->receive(receiver);
     busy_ = false;
     if (any) return true;
   } while (looks_again_ && may_look_again && timeout.count() > 0 &&

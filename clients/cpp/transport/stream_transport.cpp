@@ -73,9 +73,9 @@ bool StreamTransport::has_news() {
   return open && (is_readable(open->file(), 0) || busy_);
 }
 
-bool StreamTransport::take(bus::StreamConnection& from, const Receiver& receiver) {
+bool StreamTransport::receive(bus::StreamConnection& from, const Receiver& receiver) {
   busy_ = true;
-  const bool any = from.take(0, receiver);
+  const bool any = from.receive(0, receiver);
   busy_ = false;
   return any;
 }
@@ -95,11 +95,11 @@ bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver&
   static const bool may_look_again = std::thread::hardware_concurrency() > 1;
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {
-    if (take(*open, receiver)) return true;
+    if (receive(*open, receiver)) return true;
   } while (may_look_again && timeout.count() > 0 && !open->is_over() &&
            std::chrono::steady_clock::now() < sleep_at);
   if (!open->is_over() && is_readable(open->file(), static_cast<int>(timeout.count())) &&
-      take(*open, receiver))
+      receive(*open, receiver))
     return true;
   if (open->is_over()) {
     const std::lock_guard lock(mutex_);

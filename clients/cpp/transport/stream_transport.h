@@ -32,7 +32,7 @@ class StreamTransport : public Transport {
  private:
   std::shared_ptr<bus::StreamConnection> connection();
   void connect();  // throws EnvironmentError
-  bool take(bus::StreamConnection& from, const Receiver& receiver);
+  bool receive(bus::StreamConnection& from, const Receiver& receiver);
 
   const bus::LcmUrl address_;
   std::mutex mutex_;

@@ -30,8 +30,8 @@
 #include "ruedo/math.h"
 #include "system/plugins.h"
 #include "watched_run.h"
-#include "world/edit/randomization.h"
 #include "world/load.h"
+#include "world/randomization.h"
 
 namespace nb = nanobind;
 using ruedo::Primitive;

@@ -157,8 +157,8 @@ def check_callback(value: Any) -> None:
 
 
 def array(what: str, value: Any) -> NDArray[np.float64]:
-    """Real numbers of any shape. What is no number, and what an array of them would lose of its
-    values (imaginary parts, masks, units of time), is refused. Raises TypeError.
+    """Real numbers of any shape. Raises TypeError for other values, and for arrays with imaginary
+    parts, masks or units of time, which a float64 would lose.
     """
     try:
         given = np.asarray(value)

@@ -67,7 +67,7 @@ class Subscription:
             if not self._keep(error, self._what) and not self._failed:
                 self._failed = True
                 log.exception(
-                    "a callback on %s failed; it is called on, and this is said once", self._what
+                    "a callback on %s failed; it stays subscribed (shown once)", self._what
                 )
 
 

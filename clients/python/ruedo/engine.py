@@ -266,7 +266,7 @@ class Engine:
             raise TypeError(f"a field is named by a text, DEVICE.FIELD, not by {shown(name)}")
         device, dot, field = checked_text("a field", name).rpartition(".")
         if not dot or not device or not field or len(name) > _MOST_FIELD:
-            raise ValueError(f"{shown(name)} is no DEVICE.FIELD; for example 'lrf.ranges'")
+            raise ValueError(f"{shown(name)} is not a DEVICE.FIELD; for example 'lrf.ranges'")
         values: NDArray[Any] = self._core.observe(device, field)
         return values
 
@@ -279,13 +279,12 @@ class Engine:
         n: int = 1,
         worlds: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Computes n states of every copy, or of those that a mask names; the others stay as they
-        are, whatever is commanded.
+        """Steps every copy n times, or only the copies that the mask `worlds` selects.
 
         commands: velocities on the states that there are, broadcast to (worlds, robots, 2) as (m/s
-        ahead, rad/s) or (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no
-        command. What was commanded before holds, until the robot's watchdog (600 ms of sim time by
-        default).
+        ahead, rad/s) or (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN
+        commands nothing: the last command holds until the robot's watchdog ends it (600 ms of sim
+        time by default).
 
         Every 200 steps signals are looked at: what their handlers raise (Ctrl-C) ends it there.
         All copies have computed as many steps then; :meth:`steps` says where they are.

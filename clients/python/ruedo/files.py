@@ -136,7 +136,7 @@ def _check_value(node: Any) -> None:
     except Exception:  # whatever a constructor stumbles over
         kind = node.tag.rpartition(":")[2]
         raise yaml.MarkedYAMLError(
-            problem=f"{node.value[:40]!r} is no {kind}", problem_mark=node.start_mark
+            problem=f"{node.value[:40]!r} is not of type {kind}", problem_mark=node.start_mark
         ) from None
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
         raise yaml.MarkedYAMLError(

@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from . import arguments
-from .transport.address import has_multicast_route, read_address
 from .errors import LaunchError, NoServer, for_terminal
 from .session.progress import FIRST
 from .simulation import Simulation
+from .transport.address import has_multicast_route, read_address
 from .transport.stream import is_served
 from .world import World
 
@@ -39,7 +39,7 @@ def find_ruedo() -> str:
     named = os.environ.get("RUEDO")
     if named:
         if not os.access(named, os.X_OK) or os.path.isdir(named):
-            raise LaunchError(f"the environment's RUEDO is {named!r}, which is no program")
+            raise LaunchError(f"the environment's RUEDO is {named!r}, which is not a program")
         return os.path.abspath(named)  # it may be started from another folder
     above = Path(__file__).resolve().parents
     for candidate in (folder / "bin/ruedo" for folder in above):

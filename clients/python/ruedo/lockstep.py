@@ -15,16 +15,13 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from . import lcmtypes
-
-from .transport import arrivals
 from .arguments import shown
 from .channel_names import ChannelNames
-from .session.control import state_of
 from .decoding import decode
 from .errors import (
     LeaseLost,
@@ -37,10 +34,13 @@ from .errors import (
     for_terminal,
 )
 from .samples import State
+from .session.control import state_of
+from .session.link import Link
 from .stream import Stream, sample_of
+from .transport import arrivals
 
 if TYPE_CHECKING:
-    from .session.connection import Connection
+    from .session.control import Session
     from .world_info import WorldInfo
 
 T = TypeVar("T")
@@ -194,10 +194,15 @@ class _Step:
         return [(names.of(entry.channel), entry.data) for entry in entries]
 
 
+class _Link(Link, Protocol):
+    @property
+    def session(self) -> Session: ...
+
+
 class Stepper:
     """Called with the simulation's turn: one step() at a time."""
 
-    def __init__(self, connection: Connection):
+    def __init__(self, connection: _Link):
         self._connection = connection
         self._part = False  # takes part
         self._info: Any = None  # whose channels are subscribed
@@ -323,7 +328,7 @@ class Stepper:
                 raise ValueError("where nobody stands")
         except Exception:
             raise TypeMismatch(
-                "the reply to GRANT is no grant_reply_t of this client's version"
+                "the reply to GRANT is not a grant_reply_t of this client's version"
             ) from None
         self._run_id, self._epoch = self._connection.info.run_id, reply.epoch
         self._granted, self._have, self._newest = stands.granted, stands.received, stands.step

@@ -83,7 +83,7 @@ class Log:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Raises ValueError for a file that is no log."""
+        """Raises ValueError for a file that is not a log."""
         self.path = os.fspath(path)
         if os.path.isdir(path):
             raise IsADirectoryError(f"{self.path}: a folder, and no log")
@@ -154,7 +154,7 @@ class Log:
 
 
 def open_log(path: str | os.PathLike[str]) -> Log:
-    """A recorded run, to be read by channel and time. Raises ValueError for what is no log."""
+    """A recorded run, to be read by channel and time. Raises ValueError for any other file."""
     return Log(path)
 
 
@@ -174,8 +174,8 @@ def read_log(
     messages of these times (s). raw: the members of the message for all of them. A log that is
     damaged or was cut off is read up to there and no further, which is logged as a warning.
 
-    Needs pandas (pip install 'ruedo[logs]'). Raises ValueError for a file that is no log. A message
-    that is no valid one of its channel's type is left out.
+    Needs pandas (pip install 'ruedo[logs]'). Raises ValueError for a file that is not a log.
+    A message that does not decode as its channel's type is left out.
     """
     pandas = _pandas()
     wanted = None if channels is None else set(channels)

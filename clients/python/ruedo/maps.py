@@ -103,7 +103,7 @@ def _grey(picture: Path) -> NDArray[np.uint8]:
         return _by_pillow(picture, content)
     head = _PGM.match(content)
     if not head:
-        raise ValueError(f"{picture}: is no PGM")
+        raise ValueError(f"{picture}: is not a PGM")
     width, height, largest = map(int, head.groups())
     pixels = len(content) - head.end()
     if largest != 255 or not 0 < width * height <= pixels:
@@ -127,4 +127,4 @@ def _by_pillow(picture: Path, content: bytes) -> NDArray[np.uint8]:
             raise ValueError(f"{width} x {height} pixels are too many")
         return np.asarray(image.convert("L"))
     except Exception as error:  # Pillow has many, of its own and of Python's
-        raise ValueError(f"{picture}: is no picture that can be read: {error}") from None
+        raise ValueError(f"{picture}: is not a picture that can be read: {error}") from None

@@ -25,7 +25,7 @@ def lines(points: ArrayLike, color: Color = _BLUE, width: float = 0.03) -> lcmty
     marker = _made(lcmtypes.marker_t.LINES, color, width)
     _set_points(marker, points)
     if marker.n % 2:
-        raise ValueError(f"lines have two ends each; {marker.n} points are no pairs")
+        raise ValueError(f"lines have two ends each; {marker.n} points do not make pairs")
     return marker
 
 

@@ -7,16 +7,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from . import lcmtypes
 from .errors import MotionError, Timeout, UnknownName
 from .samples import Collisions, MotionStatus
+from .session.link import Link
 
 if TYPE_CHECKING:
     from .callbacks import Subscription
-    from .session.connection import Connection
-    from .robot import Robot
+    from .stream import Stream
     from .world_info import WorldInfo
 
 log = logging.getLogger("ruedo")
@@ -29,10 +29,26 @@ _UNSEEN_STATUSES = 20
 _UNSEEN_SECONDS = 5.0
 
 
+class _Robot(Protocol):
+    """Whose primitives they are; a Robot."""
+
+    name: str
+
+    @property
+    def collisions(self) -> Stream[Collisions]: ...
+    @property
+    def motion(self) -> Stream[MotionStatus]: ...
+
+
+class _Link(Link, Protocol):
+    @property
+    def drivers(self) -> Drivers: ...
+
+
 class Motion:
     """A motion primitive under way. state: "sent", then the states of MotionStatus."""
 
-    def __init__(self, connection: Connection, robot: str, id: int, kind: str, amount: float):
+    def __init__(self, connection: _Link, robot: str, id: int, kind: str, amount: float):
         self.id, self.kind = id, kind
         self.state = "sent"
         self.progress = 0.0  # m or rad done
@@ -164,7 +180,7 @@ class Driver:
     one for each name.
     """
 
-    def __init__(self, connection: Connection, robot: Robot):
+    def __init__(self, connection: _Link, robot: _Robot):
         self._connection, self._robot = connection, robot
         self._lock = threading.Lock()
         self._held: tuple[str, bytes] | None = None
@@ -177,7 +193,7 @@ class Driver:
         self._watchdog_told = False
         self._ended = ""
 
-    def hold(self, channel: str, data: bytes) -> None:
+    def keep_sending(self, channel: str, data: bytes) -> None:
         """Publishes the command now, and again until the next one."""
         self._listen()
         with self._lock:
@@ -288,7 +304,7 @@ class Drivers:
     use from any thread.
     """
 
-    def __init__(self, connection: Connection):
+    def __init__(self, connection: _Link):
         self._connection = connection
         self._lock = threading.Lock()
         self._all: dict[str, Driver] = {}
@@ -296,7 +312,7 @@ class Drivers:
         self._wake = threading.Condition()
         self._thread: threading.Thread | None = None
 
-    def get(self, robot: Robot) -> Driver:
+    def get(self, robot: _Robot) -> Driver:
         self._connection.check_open()
         with self._lock:
             return self._all.setdefault(robot.name, Driver(self._connection, robot))

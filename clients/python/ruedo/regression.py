@@ -86,7 +86,7 @@ def _option(name: str, *values: object) -> list[str]:
 def _held(name: str, value: object) -> str:
     given = word(name, str(value))
     if not given:  # the next option would count as its value
-        raise ValueError(f"an empty text is no {name}")
+        raise ValueError(f"{name}: an empty text is not allowed")
     if odd := _CONTROL.search(given):
         raise ValueError(
             f"{name} is {shown(given)}, which holds the control character {ord(odd[0]):#04x}"

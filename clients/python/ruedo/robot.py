@@ -56,6 +56,7 @@ class Device(Stream[T]):
 
     def __init__(self, connection: Connection, robot: str, info: Any, channel: Any):
         super().__init__(connection, channel.name, channel.type, channel.fingerprint, info.rate)
+        self._owner = connection
         self.robot: str = robot
         self.name: str = info.name
         self.kind: str = info.kind
@@ -88,7 +89,7 @@ class Camera(Device[Image]):
         return self._part("info")
 
     def _part(self, part: str) -> Stream[Any]:
-        return _camera_part(self._connection, self.robot, self.name, part)
+        return _camera_part(self._owner, self.robot, self.name, part)
 
 
 class Robot:
@@ -255,14 +256,14 @@ class Robot:
         not stop the robot. vy: m/s to the left, of a robot that moves sideways. Raises NotSupported
         for another robot, and in lockstep, as all that drives at once."""
         command = self.velocity_command(v, omega, vy)
-        self._driver("velocity_command(v, omega)").hold(command.channel, command.data)
+        self._driver("velocity_command(v, omega)").keep_sending(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next
         command.
         """
         command = self.wheel_command(left, right)
-        self._driver("wheel_command(left, right)").hold(command.channel, command.data)
+        self._driver("wheel_command(left, right)").keep_sending(command.channel, command.data)
 
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
@@ -548,7 +549,7 @@ class Robot:
 
 
 def _plain(connection: Connection, channel: Any, form: Form | None = None) -> Stream[Any]:
-    """A stream that is no device's."""
+    """A stream that belongs to no device."""
     return connection.streams.get(
         channel,
         lambda: Stream(

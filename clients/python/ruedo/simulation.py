@@ -14,17 +14,16 @@ from typing import Any, Literal
 import numpy as np
 
 from . import arguments, lcmtypes
-
-from .session import control
-from .transport.address import resolve_url
 from .callbacks import Subscription
-from .session.connection import Connection, PrivateServer
 from .errors import NotSupported, RunEnded
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
 from .requests import Requests
 from .robot import Robot
 from .samples import State
+from .session import control
+from .session.connection import Connection, PrivateServer
+from .transport.address import resolve_url
 from .transport.transport import Transport
 from .world_info import Body, WorldInfo
 
@@ -267,7 +266,7 @@ class Simulation(Requests):
         message = made_markers(layer, markers, frame, self._connection.clock.utime)
         channel = next((c for c in self._info.channel_list if c.type == "markers_t"), None)
         if channel is None:
-            raise NotSupported("this server takes no markers")
+            raise NotSupported("this server does not accept markers")
         self._connection.bus.publish(channel.name, message.encode())
 
     def restore(self, name: str) -> State:

@@ -20,7 +20,7 @@ from .errors import RuedoError, Timeout, TypeMismatch
 from .fast_decoding import DECODERS
 
 if TYPE_CHECKING:
-    from .session.connection import Connection
+    from .session.link import Link
     from .world_info import WorldInfo
 
 T = TypeVar("T")
@@ -116,7 +116,7 @@ class Stream(Reader[T]):
 
     def __init__(
         self,
-        connection: Connection,
+        connection: Link,
         channel: str,
         type: str,
         fingerprint: int,
@@ -208,7 +208,7 @@ class Stream(Reader[T]):
             sample: T = form.make(data)
         except Exception as error:
             raise TypeMismatch(
-                f"{self.channel}: a message of {len(data)} bytes is no valid {self.type} ({error})"
+                f"{self.channel}: a message of {len(data)} bytes is not a valid {self.type} ({error})"
             ) from None
         return sample
 

@@ -130,7 +130,7 @@ class WorldInfoAssembler:
             info = WorldInfo(decoded)
         except Exception as error:
             raise TypeMismatch(
-                f"a message on ruedo/info is no valid world_info_t ({error})"
+                f"a message on ruedo/info is not a valid world_info_t ({error})"
             ) from None
         self._last = content
         return info

@@ -18,7 +18,7 @@
 #include "base/input_file.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
-#include "world/read/document.h"
+#include "world/document/document.h"
 
 namespace ruedo::dds {
 namespace {

@@ -27,7 +27,7 @@ void for_each_said(std::span<uint8_t> message, Do what) {
 
 }  // namespace
 
-void EarlyMessages::hold(Message message, Clock::time_point now) {
+void EarlyMessages::keep(Message message, Clock::time_point now) {
   while (!held_.empty() && held_.front().came + kLongest < now) {
     bytes_ -= held_.front().message.bytes.size();
     held_.pop_front();

@@ -41,7 +41,7 @@ class EarlyMessages {
   static constexpr std::array kDelays{std::chrono::milliseconds(5), std::chrono::milliseconds(100)};
 
   // The newest give way to the oldest: these end by themselves.
-  void hold(Message message, Clock::time_point now);
+  void keep(Message message, Clock::time_point now);
   // To be called with each datagram: is_known says whether Cyclone knows a writer.
   void look(const std::function<bool(const Message&)>& is_known, Clock::time_point now);
   // Takes the heartbeats of known writers that have messages here out of a message: the first that

@@ -25,7 +25,7 @@ namespace {
 class Incoming {
  public:
   // A datagram has taken so many bytes that Cyclone may hold.
-  void hold(size_t bytes, std::span<const Samples> samples) {
+  void reserve(size_t bytes, std::span<const Samples> samples) {
     const std::lock_guard lock(mutex_);
     held_.add(bytes, samples);
   }
@@ -63,7 +63,7 @@ class Incoming {
     if (const auto writer = writer_in(message);
         writer && (known_.told(writer->first, writer->second, now) != Told::before ||
                    !knows(writer->first, writer->second)))
-      early_.hold({writer->first, writer->second, from, {message.begin(), message.end()}}, now);
+      early_.keep({writer->first, writer->second, from, {message.begin(), message.end()}}, now);
     early_.look([&](const EarlyMessages::Message& m) { return knows(m.participant, m.writer); },
                 now);
     early_.keep_order(message);
@@ -98,7 +98,7 @@ struct Received {
     const auto begin = reinterpret_cast<uintptr_t>(place), end = reinterpret_cast<uintptr_t>(next);
     if (begin != end && !samples.empty()) {
       const bool is_behind = end > begin && end - begin < 2 * std::numeric_limits<uint16_t>::max();
-      incoming.hold(is_behind ? end - begin : size, samples);
+      incoming.reserve(is_behind ? end - begin : size, samples);
     }
     samples.clear();
   }

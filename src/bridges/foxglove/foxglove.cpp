@@ -10,6 +10,7 @@
 
 #include "base/channel_names.h"
 #include "base/json.h"
+#include "base/text.h"
 #include "base/utf8.h"
 #include "bridges/foxglove/foxglove_json.h"
 #include "bridges/foxglove/message_json.h"

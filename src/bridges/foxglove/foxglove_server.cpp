@@ -162,7 +162,7 @@ class Viewer : public http::Connection {
   bool wants(size_t channel) const { return subscribed_.contains(channel); }
 
   // Others wait for the lock: texts are read without it.
-  bool receive(std::span<const uint8_t> message) override {
+  bool on_message(std::span<const uint8_t> message) override {
     const std::string_view text(reinterpret_cast<const char*>(message.data()), message.size());
     if (text.empty()) return true;
     const bool data = text[0] == kMessageData;
@@ -178,7 +178,7 @@ class Viewer : public http::Connection {
     } catch (const BadMessage& bad) {
       complain(bad.what());
     } catch (const json::exception&) {
-      complain("a message that is none of the protocol's was ignored");
+      complain("a message outside of the protocol was ignored");
     }
     return true;
   }
@@ -285,7 +285,7 @@ class Viewer : public http::Connection {
     for (size_t i = kDataHead - 1; i > 0; --i) id = id << 8 | static_cast<uint8_t>(message[i]);
     const auto known = published_.find(id);
     if (known == published_.end()) return complain(fmt::format("no channel {} was advertised", id));
-    if (command.empty()) return complain("a Twist wants finite numbers in linear and angular");
+    if (command.empty()) return complain("a Twist needs finite numbers in linear and angular");
     hub_.inject(known->second, command);
   }
 
@@ -305,7 +305,7 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
         export_(*this),
         queue_(*this, {.thread = "foxglove", .most_bytes = kMostQueued}) {
     hub_.inject = [&server](const std::string& channel, const std::vector<uint8_t>& bytes) {
-      server.receive(channel, bytes);
+      server.on_message(channel, bytes);
     };
     const json greeting = {{"op", "serverInfo"},
                            {"name", std::string("Ruedo ") + version()},

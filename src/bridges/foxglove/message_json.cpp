@@ -7,10 +7,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include "base/big_endian.h"
 #include "base/json.h"
+#include "base/text.h"
 #include "base/utf8.h"
 #include "base/wire_size.h"
 
@@ -143,14 +143,6 @@ class Walk {
 };
 
 }  // namespace
-
-std::string base64(std::span<const uint8_t> bytes) {
-  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');  // and the zero that OpenSSL adds
-  const int size = ::EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes.data(),
-                                     static_cast<int>(bytes.size()));
-  text.resize(static_cast<size_t>(size));
-  return text;
-}
 
 std::string json_number(double value) { return number_text(value); }
 std::string json_number(float value) { return number_text(value); }

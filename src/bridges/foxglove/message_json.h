@@ -10,9 +10,6 @@
 
 namespace ruedo::foxglove {
 
-// Bytes as base64, as JSON Schema's contentEncoding names it.
-std::string base64(std::span<const uint8_t> bytes);
-
 // A number as JSON that reads back to the same; of those that JSON has not, infinity as 1e999 (what
 // reads beyond the largest number is infinite) and NaN as null.
 std::string json_number(double value);

@@ -234,7 +234,7 @@ void Node::listen(const std::vector<world_info_t>& info) {
 
 void Node::add_command(std::map<std::string, Input>& inputs, const Command& command) {
   add_input(inputs, {command.topic, command.channel, command.joints, nullptr},
-            [this, command](const Sample& sample) { receive(command, sample.cdr); });
+            [this, command](const Sample& sample) { on_command(command, sample.cdr); });
 }
 
 // The reader that there is goes on where it does the same. Else it ends first: no message is to be
@@ -274,7 +274,7 @@ void Node::tell_graph() {
   graph_->write(out.bytes());
 }
 
-void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
+void Node::on_command(const Command& command, std::span<const uint8_t> cdr) {
   ++received_;
   if (!injecting_) return;
   if (const auto bytes = command.convert(cdr)) return inject_(command.channel, *bytes);
@@ -296,11 +296,11 @@ void Node::receive_pose(const std::string& robot, const std::string& topic, cons
     return count_faulty(topic, "pose in the frame map", sample.cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
-  requests_.ask(sample.sender, request_t::SET_POSE, std::move(body),
-                [this, topic](const reply_t& reply) {
-                  if (reply.code != reply_t::OK && may_warn())
-                    spdlog::warn("ROS 2: {}: {}", topic, reply.text);
-                });
+  requests_.send(sample.sender, request_t::SET_POSE, std::move(body),
+                 [this, topic](const reply_t& reply) {
+                   if (reply.code != reply_t::OK && may_warn())
+                     spdlog::warn("ROS 2: {}: {}", topic, reply.text);
+                 });
 }
 
 bool Node::may_warn() {
@@ -314,7 +314,7 @@ void Node::count_faulty(const std::string& topic, const std::string& type, size_
   const uint64_t faulty = ++faulty_;
   if (!may_warn()) return;
   spdlog::warn(
-      "ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)",
+      "ROS 2: {} got {} bytes that are not a valid {} for this robot: ignored ({} such so far)",
       topic, size, type, faulty);
 }
 

@@ -93,7 +93,7 @@ class Node : public run::Sink {
   void add_input(std::map<std::string, Input>& inputs, Input input, Transport::Handler handler);
   void tell_standing();
   void tell_graph();  // ros_discovery_info
-  void receive(const Command& command, std::span<const uint8_t> cdr);
+  void on_command(const Command& command, std::span<const uint8_t> cdr);
   void receive_pose(const std::string& robot, const std::string& topic,
                     const Sample& sample);  // initialpose
   bool may_warn();                          // once a second, whatever strangers send

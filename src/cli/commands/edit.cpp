@@ -8,7 +8,7 @@
 #include "base/input_file.h"
 #include "cli/support/run_command.h"
 #include "ruedo/errors.h"
-#include "world/read/document.h"
+#include "world/document/document.h"
 #include "world/world_name.h"
 
 namespace fs = std::filesystem;

@@ -81,7 +81,7 @@ int show(const PlayArguments& arguments, double speed) {
   if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
   if (!arguments.lcm.empty())
     throw InputError(
-        {}, "--lcm goes not with --view: the page shows the log, and nothing is published");
+        {}, "--lcm cannot be used with --view: the page shows the log, and nothing is published");
   const auto serving = view_log(first.path(), arguments.view, speed, second.path());
   heed(SIGINT);
   heed(SIGTERM);

@@ -61,7 +61,7 @@ void ClientPace::pace(run::Run* run) {
   run_ = run;
   if (!run_ || !waits_) return;
   holds_ = true;
-  run_->take(run::LauncherProgress{});
+  run_->note_progress(run::LauncherProgress{});
 }
 
 void ClientPace::heard() {
@@ -98,13 +98,13 @@ void ClientPace::read_lines() {
   for (ssize_t count; (count = ::read(read_.get(), bytes, sizeof bytes)) > 0;) {
     said_.append(bytes, static_cast<size_t>(count));
     for (size_t end; (end = said_.find('\n')) != std::string::npos; said_.erase(0, end + 1))
-      take(said_.substr(0, end));
+      on_line(said_.substr(0, end));
     if (said_.size() > sizeof bytes) said_.clear();
   }
   tell();
 }
 
-void ClientPace::take(std::string line) {
+void ClientPace::on_line(std::string line) {
   const auto sender = take_sender(line);
   const auto progress = run::read_launcher_progress(line);
   if (!sender || !progress) return;
@@ -135,7 +135,7 @@ void ClientPace::tell() {
   }
   followed_ = true;
   holds_ = false;
-  run_->take(slowest);
+  run_->note_progress(slowest);
 }
 
 }  // namespace ruedo::cli

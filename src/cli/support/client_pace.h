@@ -49,7 +49,7 @@ class ClientPace {
 
   void watch();
   void read_lines();  // with the mutex held, as the next
-  void take(std::string line);
+  void on_line(std::string line);
   void tell();
 
   FileHandle read_, told_, stop_;

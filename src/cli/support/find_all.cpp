@@ -23,7 +23,7 @@ void check_textures(const world::WorldModel& world, std::vector<Finding>& findin
         {Finding::Kind::unsupported,
          {texture->path.empty() ? owner : texture->path, 0},
          "",
-         "the texture is no picture that can be read; the plain colour is shown instead"});
+         "the texture is not a picture that can be read; the plain colour is shown instead"});
   };
   for (const world::ModelInstance& instance : world.models) {
     for (const world::Link& link : instance.model->links) {

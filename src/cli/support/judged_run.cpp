@@ -120,11 +120,11 @@ judge::Check client_check(const JudgedRunOptions& options, const ClientProcess& 
   } else if (!was_heard && options.waits) {
     check.outcome = judge::Outcome::not_judged;
     check.text = fmt::format(
-        "the client{} was never heard on the bus (a program that only listens wants "
-        "--no-client-wait)",
+        "the client{} sent nothing on the bus (use --no-client-wait for a program that only "
+        "listens)",
         client.was_told_to_end() ? "" : " ended with 0 and");
   } else if (client.was_told_to_end()) {
-    check.text = "the client ran to the end, and ended when it was told to";
+    check.text = "the client ran to the end, and ended at the signal to end";
   } else {
     check.text =
         until ? fmt::format("the client ended with 0 at {:g} s", static_cast<double>(*until) * 1e-6)

@@ -13,17 +13,17 @@
 namespace ruedo::cli {
 
 struct LauncherPipe::Paced {
-  void take(std::string_view line) {
+  void on_line(std::string_view line) {
     const auto read = run::read_launcher_progress(line);
     if (!read) return;
     const std::lock_guard lock(mutex);
     last = read;
-    if (run) run->take(*last);
+    if (run) run->note_progress(*last);
   }
   void pace(run::Run* paced) {
     const std::lock_guard lock(mutex);
     run = paced;
-    if (run && last) run->take(*last);
+    if (run && last) run->note_progress(*last);
   }
 
   std::mutex mutex;
@@ -43,7 +43,7 @@ LauncherPipe::LauncherPipe() : paced_(std::make_shared<Paced>()) {
       const size_t end = said.rfind('\n');
       if (end != std::string::npos) {  // the last line says all that those before it did
         const std::string_view lines(said.data(), end);
-        paced->take(lines.substr(lines.rfind('\n') + 1));
+        paced->on_line(lines.substr(lines.rfind('\n') + 1));
         said.erase(0, end + 1);
       }
       if (said.size() > sizeof bytes) said.clear();

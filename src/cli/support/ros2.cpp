@@ -183,7 +183,7 @@ class CycloneNode : public Ros2Node {
         where_(fmt::format("{}, {}", ros2::name_of(distro_of(arguments)), transport->where())),
         node_(options(arguments), std::move(transport), server.info(),
               [&server](const std::string& channel, std::span<const uint8_t> message) {
-                server.receive(channel, message.data(), message.size());
+                server.on_message(channel, message.data(), message.size());
               }),
         queue_(node_, {.thread = "ros2", .most_bytes = kMostQueued}) {
     server.add(queue_);

@@ -10,8 +10,8 @@
 #include "system/late_library.h"
 #include "system/plugins.h"
 #include "system/sandbox.h"
+#include "world/document/resources.h"
 #include "world/mesh/mesh_loader.h"
-#include "world/read/resources.h"
 #include "world/urdf/xacro.h"
 
 namespace fs = std::filesystem;

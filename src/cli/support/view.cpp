@@ -63,9 +63,9 @@ std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
   console::LiveHost host{
       .world = [&run] { return run.world(); },
       .model_text = [&run](const std::string& name) { return run.model_text(name); },
-      .receive =
+      .on_message =
           [&run](const std::string& channel, std::span<const uint8_t> message) {
-            run.receive(channel, message.data(), message.size());
+            run.on_message(channel, message.data(), message.size());
           },
       .lost = [&run] { return run.lost(); },
       .save_name = save.empty() ? "" : std::filesystem::path(save).filename().string()};

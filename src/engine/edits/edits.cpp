@@ -9,11 +9,12 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "base/text.h"
 #include "base/utf8.h"
 #include "engine/edits/world_editor.h"
-#include "world/model/placement.h"
+#include "world/document/reserved_names.h"
+#include "world/drives/placement.h"
 #include "world/read/read_context.h"
-#include "world/read/reserved_names.h"
 #include "world/read/triangle_count.h"
 
 namespace ruedo::engine {
@@ -26,7 +27,7 @@ Outcome refused(const std::string& text) { return Outcome::refuse(reply_t::REFUS
 
 std::string list_of(std::span<const double> values) {
   std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + world::shown(value);
+  for (const double value : values) text += (text.empty() ? "" : ", ") + shown(value);
   return "(" + text + ")";
 }
 
@@ -37,8 +38,8 @@ std::string fault_of(const char* what, std::span<const double> values, double mo
     if (!std::isfinite(value))
       return std::string(what) + " is " + list_of(values) + ": only finite numbers are allowed";
     if (std::abs(value) > most) {
-      return std::string(what) + " is " + list_of(values) + ": allowed is up to " +
-             world::shown(most) + " " + unit;
+      return std::string(what) + " is " + list_of(values) + ": allowed is up to " + shown(most) +
+             " " + unit;
     }
   }
   return "";
@@ -98,7 +99,7 @@ std::string fault_of_pose(const double (&position)[3], const double (&orientatio
 std::string fault_of_name(const std::string& name) {
   if (name.empty() || name.size() > kLongestName)
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
-  if (!is_one_line(name)) return "is no UTF-8 text without control characters";
+  if (!is_one_line(name)) return "is not UTF-8 text without control characters";
   if (name == "ruedo" || world::is_reserved_name(name))
     return "is kept for Ruedo itself; choose another";
   if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";

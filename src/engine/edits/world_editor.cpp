@@ -8,7 +8,7 @@
 
 #include "engine/edits/edits.h"
 #include "ruedo/math.h"
-#include "world/model/placement.h"
+#include "world/drives/placement.h"
 
 namespace ruedo::engine {
 

@@ -106,7 +106,7 @@ std::string Faults::check(const world::Fault& fault, RobotIndex robot) const {
                          name_of(robot), fmt::join(names, ", "));
     }
     if (!applies_to(sensor_kind(fault.kind), device->kind))
-      return fmt::format("{} is no fault of {} {}", fault.kind,
+      return fmt::format("{} is not a fault of {} {}", fault.kind,
                          device->kind.find_first_of("aeio") == 0 ? "an" : "a", device->kind);
   } else if (kind.of != world::FaultKind::Of::world &&
              !world_->models[layout_->robots[robot].instance].model->drive) {

@@ -138,7 +138,7 @@ void Broadphase::remove_pair(Proxy& a, Proxy& b, btDispatcher* dispatcher) {
   if (b.moves) std::erase(b.partners, &a);
 }
 
-void Broadphase::take(const Broadphase& other, btDispatcher* dispatcher) {
+void Broadphase::copy_from(const Broadphase& other, btDispatcher* dispatcher) {
   auto from = other.proxies_.begin();  // numbered the same
   for (auto& [id, proxy] : proxies_) {
     while (!proxy.partners.empty()) remove_pair(proxy, *proxy.partners.back(), dispatcher);

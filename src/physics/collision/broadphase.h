@@ -58,7 +58,7 @@ class Broadphase final : public btBroadphaseInterface {
 
   // Takes the state of the broadphase of another copy of the world, whose filter gives the same
   // answers. The pairs get the other one's order, and are new to the dispatcher.
-  void take(const Broadphase& other, btDispatcher* dispatcher);
+  void copy_from(const Broadphase& other, btDispatcher* dispatcher);
   // Writes that state, or reads it into a broadphase with the same objects.
   void exchange(StateArchive& archive, btDispatcher* dispatcher);
 

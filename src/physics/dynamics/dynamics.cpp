@@ -93,7 +93,7 @@ void Dynamics::reserve(size_t bodies) {
   }
 }
 
-void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
+void Dynamics::set_bodies(const std::vector<btRigidBody*>& bodies) {
   m_collisionObjects.resizeNoInitialize(0);  // Bullet's own lists are not used
   m_nonStaticRigidBodies.resizeNoInitialize(0);
   for (btRigidBody* body : bodies_) body->setIslandTag(-1);
@@ -123,8 +123,8 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
   }
 }
 
-void Dynamics::take(const Dynamics& other,
-                    const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here) {
+void Dynamics::copy_from(const Dynamics& other,
+                         const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here) {
   const auto& from =
       // as Bullet's interface has it
       const_cast<Dynamics&>(other).getPairCache()->getOverlappingPairArray();

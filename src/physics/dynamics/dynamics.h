@@ -29,13 +29,13 @@ class Dynamics final : public btDiscreteDynamicsWorld {
 
   // Selects the bodies that are simulated from now on. What contacts and joints could move with one
   // of them must be among them.
-  void take(const std::vector<btRigidBody*>& bodies);
+  void set_bodies(const std::vector<btRigidBody*>& bodies);
 
   // Takes the state of another copy of the world that has the same pairs in the same order, as far
   // as Bullet keeps any. All objects must be awake. joint_here maps the other world's joints to
   // those of this one.
-  void take(const Dynamics& other,
-            const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
+  void copy_from(const Dynamics& other,
+                 const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
   // Writes that state, or reads it, likewise. joints: all of the world's, in an order that copies
   // share.
   void exchange(StateArchive& archive, const std::vector<btTypedConstraint*>& joints);

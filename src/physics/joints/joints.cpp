@@ -171,7 +171,7 @@ JointConstraint::Constraint JointConstraint::make_gearbox() {
 
 // The part that belongs to Bullet's constraint; everything else follows from the joint and its
 // bodies in each substep.
-void JointConstraint::take(const JointConstraint& other) {
+void JointConstraint::copy_from(const JointConstraint& other) {
   JointState::operator=(other);
   *motors_ = *other.motors_;
   for (JointMotor* motor : {&motors_->first, &motors_->second})

@@ -95,7 +95,7 @@ class JointConstraint : private JointState {
   }
 
   // Takes the state of the same joint in another copy of the world.
-  void take(const JointConstraint& other);
+  void copy_from(const JointConstraint& other);
   void exchange(StateArchive& archive);  // likewise
 
   // For the coming substep: follows another joint, with at most its maximum effort. The leader does

@@ -13,7 +13,7 @@ Repeating::Repeating(const std::string& path, const Mode* after) : replay_(path)
   log::check_files_of_spawned(path);
   if (!after_) return;
   length_ = length_of(path);
-  if (!length_.fault.empty()) throw InputError({path}, "is no snapshot: " + length_.fault);
+  if (!length_.fault.empty()) throw InputError({path}, "is not a snapshot: " + length_.fault);
   progress_.emplace("restoring " + path, length_.steps);
 }
 

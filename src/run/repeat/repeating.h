@@ -31,7 +31,7 @@ class Repeating : public Mode {
   void begin(const Stage& stage, int64_t step) override;
   Turn turn(int64_t step) override;
   void executed(const engine::Outcome& outcome) override;
-  bool receive(const std::string&, const uint8_t*, size_t) override { return true; }
+  bool on_message(const std::string&, const uint8_t*, size_t) override { return true; }
   std::string refusal(int32_t kind, bool looks) const override;
   bool early(const request_t& request, const Session& session) const override;
 

@@ -127,9 +127,7 @@ void Run::begin_with_state() {
   const std::optional<SavedState> saved = read_state(path);
   if (!saved || saved->seed != options_.simulation.fleet.seed ||
       saved->sequences.size() != publisher_.sequences().size()) {
-    spdlog::info(
-        "{} has no state that can be taken over as it is: the world runs there again, {} steps",
-        path, repeating_->steps());
+    spdlog::info("{} holds no restorable state; re-simulating {} steps", path, repeating_->steps());
     return;
   }
   {

@@ -19,7 +19,7 @@ std::string fit_text(const std::string& text) {
 
 }  // namespace
 
-bool Control::receive(const uint8_t* data, size_t size) {
+bool Control::on_request(const uint8_t* data, size_t size) {
   request_t request;
   if (decode_checked(data, size, request) != DecodeFault::none) {
     ++refused_;
@@ -98,7 +98,7 @@ void Control::serve(const request_t& request) {
   // Checked after the sequence, so that a repeated RESET, of the epoch that it ended, is answered.
   if (request.epoch != -1 && request.epoch != reply.epoch)
     return answer_with(reply_t::WRONG_EPOCH, "the world was reset since");
-  if (must_wait(request)) return hold(request);
+  if (must_wait(request)) return defer(request);
   execute(request, *session, reply);
 }
 
@@ -155,7 +155,7 @@ bool Control::must_wait(const request_t& request) const {
 }
 
 // A client that has used up its share has to ask again.
-void Control::hold(const request_t& request) {
+void Control::defer(const request_t& request) {
   const auto of_session = [&](const request_t& held) { return held.session == request.session; };
   const auto same = [&](const request_t& held) {
     return of_session(held) && held.sequence >= request.sequence;
@@ -181,7 +181,7 @@ void Control::join(const request_t& request, reply_t& reply) {
       request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
     reply.text =
-        "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and "
+        "JOIN needs a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and "
         "a sequence above 0";
   } else if (const Session* session = sessions_.join(body.client, request.sequence, host_.keeps)) {
     reply.session = session->id;

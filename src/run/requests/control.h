@@ -55,7 +55,7 @@ class Control {
   Control(int64_t run_id, Host host) : run_id_(run_id), host_(std::move(host)) {}
 
   // Any thread. False for what is not a request.
-  bool receive(const uint8_t* data, size_t size);
+  bool on_request(const uint8_t* data, size_t size);
 
   // Executes the waiting requests; called often, by the publisher's thread. After seconds without a
   // call (a long request, a stopped process), no client is blamed for its silence.
@@ -86,7 +86,7 @@ class Control {
   Sessions::Verdict judge(const request_t& request, const Session& session, reply_t& reply);
   bool is_waiting(int64_t session, int64_t sequence) const;  // executed, and not answered yet
   bool must_wait(const request_t& request) const;
-  void hold(const request_t& request);
+  void defer(const request_t& request);
   bool has_too_many(const request_t& request) const;
   template <class Condition>
   void refuse_waiting(const std::string& why, int32_t code, Condition condition);

@@ -24,7 +24,7 @@ bool Run::stand_still() {
   const int64_t last = pacer_->hold();
   while (publisher_.step() < last) {
     if (simulation_->over()) return false;  // a run whose state became invalid has ended early
-    if (const engine::Batch* batch = simulation_->take())
+    if (const engine::Batch* batch = simulation_->next_batch())
       publish(*batch);
     else
       wakeup_.wait();
@@ -172,7 +172,7 @@ void Run::spawn_ready() {
   worker_.keep(pending);
   for (;; made_.reset()) {
     if (!made_) {
-      made_ = worker_.take();
+      made_ = worker_.take_made();
       if (!made_) return;
       enters_at_ = mode().granted();
     }

@@ -10,9 +10,10 @@
 #include <filesystem>
 
 #include "base/input_file.h"
+#include "base/xml.h"
 #include "ruedo/errors.h"
 #include "system/file_handle.h"
-#include "world/read/document.h"
+#include "world/document/document.h"
 
 namespace fs = std::filesystem;
 
@@ -112,7 +113,7 @@ void EditedWorld::spawned(const std::string& name, const spawn_request_t& body) 
   put_.insert(name);
   spawned_[name] = named
                        ? "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n<include>\n      <uri>" +
-                             world::escaped((path ? "" : "model://") + body.model) +
+                             xml_escaped((path ? "" : "model://") + body.model) +
                              "</uri>\n    </include>\n</sdf>\n"
                        : body.text;
 }

@@ -43,7 +43,7 @@ engine::Outcome ModelWorker::add(Order order) {
   return engine::Outcome::later();
 }
 
-std::optional<ModelWorker::Made> ModelWorker::take() {
+std::optional<ModelWorker::Made> ModelWorker::take_made() {
   const std::lock_guard lock(mutex_);
   if (made_) changed_.notify_all();
   return std::exchange(made_, std::nullopt);

@@ -18,7 +18,7 @@
 #include "engine/edits/edits.h"
 #include "engine/queue.h"
 #include "ruedo/request_t.hpp"
-#include "world/read/load_budget.h"
+#include "world/document/load_budget.h"
 
 namespace ruedo::run {
 
@@ -42,9 +42,9 @@ class ModelWorker {
   ModelWorker(engine::ModelStore& store, engine::Wakeup& ready, std::function<void()> before);
   ~ModelWorker();  // abandons what is left
 
-  // For the publisher's thread, as is take(). The outcome is pending, or a refusal.
+  // For the publisher's thread, as is take_made(). The outcome is pending, or a refusal.
   engine::Outcome add(Order order);
-  std::optional<Made> take();
+  std::optional<Made> take_made();
   // Makes no model of an order for which that is false.
   void keep(const std::function<bool(const request_t&)>& wanted);
 

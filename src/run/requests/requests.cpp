@@ -120,7 +120,7 @@ int64_t Run::features() const {
   return bits;
 }
 
-Outcome Run::ask(const request_t& request, const Session& session) {
+Outcome Run::admit(const request_t& request, const Session& session) {
   const RequestKind* kind = find_request_kind(request.kind);
   if (kind && serves(*kind)) {
     std::string refusal = mode().refusal(request.kind, kind->effect == RequestKind::looks);

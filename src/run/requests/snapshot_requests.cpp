@@ -52,9 +52,10 @@ Outcome Run::snapshot(const request_t& request) {
   if (!is_past && !read_body(request, now)) return bad_body<name_request_t>();
   const std::string& name = is_past ? past.name : now.name;
   if (journal_->snapshot_path(name).empty()) {
-    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + name +
-                                                     "' is no name of a snapshot: 1 to 63 letters, "
-                                                     "digits, '_', '-' and '.', not first a '.'");
+    return Outcome::refuse(reply_t::BAD_REQUEST,
+                           "'" + name +
+                               "' is not a name of a snapshot: 1 to 63 letters, "
+                               "digits, '_', '-' and '.', not first a '.'");
   }
   saved_states_.forget(journal_->snapshot_path(name));
   if (is_past) return snapshot_of(past);
@@ -171,10 +172,8 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
                                          "most, and `ruedo run --restore` as many as it takes",
                                          path, repeating->steps(), kMostSteps));
     }
-    spdlog::info(
-        "{} has no state that can be taken over as it is: the world runs there again, {} "
-        "steps; PAUSE ends it",
-        path, repeating->steps());
+    spdlog::info("{} holds no restorable state; re-simulating {} steps (PAUSE cancels)", path,
+                 repeating->steps());
     reset_request_t reset;
     reset.what = reset_request_t::ALL;
     reset.seed = header.seed == header_.seed ? -1 : header.seed;

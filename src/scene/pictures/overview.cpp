@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "world/read/geometry.h"
+#include "world/model/bounds.h"
 
 namespace ruedo::scene {
 namespace {

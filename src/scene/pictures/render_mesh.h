@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "ruedo/pose.h"
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::scene {
 

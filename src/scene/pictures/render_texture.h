@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::scene {
 

@@ -13,7 +13,7 @@
 
 #include "scene/rays/ray_embree.h"
 #include "scene/rays/ray_shapes.h"
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::scene {
 

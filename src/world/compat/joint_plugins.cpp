@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/text.h"
 #include "world/compat/plugins.h"
 
 namespace ruedo::world {

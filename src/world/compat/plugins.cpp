@@ -285,4 +285,15 @@ PluginKind kind_of(const Element& plugin) {
   return {filename && !filename->empty() ? *filename : "(without a filename)", Does::unknown, ""};
 }
 
+void collect_plugins(const Element& element, std::vector<const Element*>& plugins) {
+  for (const auto& child : element.children) {
+    if (child->name == "plugin")
+      plugins.push_back(child.get());
+    else if (child->name == "link" || child->name == "sensor" || child->name == "visual" ||
+             child->name == "camera") {
+      collect_plugins(*child, plugins);
+    }
+  }
+}
+
 }  // namespace ruedo::world

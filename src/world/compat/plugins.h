@@ -6,6 +6,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "ruedo/element.h"
 
@@ -29,5 +30,8 @@ struct PluginKind {
 };
 
 PluginKind kind_of(const Element& plugin);
+
+// The <plugin> elements of a model, and of the links, sensors, visuals and cameras in it.
+void collect_plugins(const Element& element, std::vector<const Element*>& plugins);
 
 }  // namespace ruedo::world

@@ -8,6 +8,7 @@
 #include <set>
 #include <string_view>
 
+#include "base/text.h"
 #include "ruedo/math.h"
 #include "world/compat/ros_controllers.h"
 

@@ -189,7 +189,7 @@ void read_controller(const Controller& controller, Reader& reader) {
       };
       if (std::none_of(joints.begin(), joints.end(), is_of))
         reader.error(each->source, "controller '" + controller.name + "': gains of the joint '" +
-                                       each->name + "', which is none of its joints");
+                                       each->name + "', which is not one of its joints");
     }
   }
   for (const std::string& joint : joints) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "ruedo/math.h"
 #include "world/compat/plugins.h"
 #include "world/read/read_context.h"

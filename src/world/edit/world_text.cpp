@@ -10,11 +10,12 @@
 #include <fmt/format.h>
 
 #include "base/input_file.h"
+#include "base/xml.h"
 #include "ruedo/math.h"
-#include "world/read/document.h"
+#include "world/document/document.h"
+#include "world/document/resources.h"
+#include "world/document/sdf_version.h"
 #include "world/read/read_context.h"
-#include "world/read/resources.h"
-#include "world/read/sdf_version.h"
 #include "world/urdf/urdf.h"
 
 namespace fs = std::filesystem;
@@ -122,21 +123,22 @@ void put(const std::string& text, const TextElement& element, const Pose& X_WM, 
 
 void call(const std::string& text, const TextElement& element, const std::string& name,
           TextPatch& patch) {
-  if (element.name == "include") return set_child(text, element, "name", escaped(name), patch);
+  if (element.name == "include") return set_child(text, element, "name", xml_escaped(name), patch);
   if (const auto* written = element.attribute("name"))
-    patch.replace(written->value, written->past, escaped(name));
+    patch.replace(written->value, written->past, xml_escaped(name));
 }
 
 // Elements as text, for sources that are not SDF.
 std::string written(const Element& element, const std::string& indent) {
   std::string text = indent + "<" + element.name;
   for (const auto& [name, value] : element.attributes)
-    text += " " + name + "=\"" + escaped(value) + "\"";
+    text += " " + name + "=\"" + xml_escaped(value) + "\"";
   if (element.children.empty())
-    return text +
-           (element.text.empty() ? "/>" : ">" + escaped(element.text) + "</" + element.name + ">");
+    return text + (element.text.empty()
+                       ? "/>"
+                       : ">" + xml_escaped(element.text) + "</" + element.name + ">");
   text += ">";
-  if (!element.text.empty()) text += escaped(element.text);
+  if (!element.text.empty()) text += xml_escaped(element.text);
   for (const auto& child : element.children) text += "\n" + written(*child, indent + "  ");
   return text + "\n" + indent + "</" + element.name + ">";
 }
@@ -153,7 +155,8 @@ void say_frames_of_axes(const std::string& text, const Element& element, const T
     const std::string* joint = element.attribute("name");
     if (!joint || (xyz && xyz->attribute("expressed_in"))) continue;
     const bool of_model = in_model || child.boolean("use_parent_model_frame", false);
-    const std::string said = " expressed_in=\"" + (of_model ? "__model__" : escaped(*joint)) + "\"";
+    const std::string said =
+        " expressed_in=\"" + (of_model ? "__model__" : xml_escaped(*joint)) + "\"";
     const TextElement& axis = place.children[i];
     const TextElement* written = axis.child("xyz");
     if (written)
@@ -393,9 +396,9 @@ std::string world_text_of(const WorldModel& world) {
   const bool single = root->name != "sdf" || root->all("model").size() == 1;
   if (single && !world.models.empty()) {
     const ModelInstance& model = world.models.back();
-    models = "    <include>\n      <uri>" + escaped(fs::path(world.file).filename().string()) +
-             "</uri>\n      <name>" + escaped(model.name) + "</name>\n      <pose>" + place(model) +
-             "</pose>\n    </include>\n";
+    models = "    <include>\n      <uri>" + xml_escaped(fs::path(world.file).filename().string()) +
+             "</uri>\n      <name>" + xml_escaped(model.name) + "</name>\n      <pose>" +
+             place(model) + "</pose>\n    </include>\n";
   } else {
     const TextElement places = places_in(text);
     for (const TextElement& child : places.children) {
@@ -425,7 +428,8 @@ std::string moved_to(const std::string& text, const std::string& from_folder,
     if (path.empty() || path.find("://") != std::string::npos || fs::path(path).is_absolute() ||
         !fs::exists(from / path, error))
       return;
-    patch.replace(place.inside, place.past, escaped((from / path).lexically_relative(to).string()));
+    patch.replace(place.inside, place.past,
+                  xml_escaped((from / path).lexically_relative(to).string()));
   };
   visit(visit, *parse_document(text, to_folder), places_in(text));
   return patch.applied_to(text);

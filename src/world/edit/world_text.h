@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "world/document/xml_text.h"
 #include "world/model/world_model.h"
-#include "world/read/xml_text.h"
 
 namespace ruedo::world {
 

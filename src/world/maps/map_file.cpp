@@ -8,14 +8,15 @@
 
 #include "base/input_file.h"
 #include "base/progress.h"
+#include "base/text.h"
 #include "base/utf8.h"
 #include "ruedo/math.h"
 #include "ruedo/quantity.h"
 #include "system/output_file.h"
+#include "world/document/document.h"
 #include "world/maps/occupancy.h"
 #include "world/mesh/codecs.h"
 #include "world/mesh/picture.h"
-#include "world/read/document.h"
 #include "world/read/read_context.h"
 
 namespace fs = std::filesystem;
@@ -42,12 +43,6 @@ void for_each_line(const std::string& path, size_t most_bytes, Visit visit) {
   }
 }
 
-std::string trimmed(const std::string& text) {
-  const size_t begin = text.find_first_not_of(" \t");
-  return begin == std::string::npos ? ""
-                                    : text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
-}
-
 double number(const std::string& text, const Source& source, const std::string& what) {
   double value = 0;
   const size_t plus = text.starts_with('+') && !text.starts_with("+-") ? 1 : 0;
@@ -72,14 +67,14 @@ class FlatYaml {
       text = trimmed(text);
       if (text.empty() || text == "---" || text == "...") return;
       if (text[0] == '-' && !key.empty() && text.size() > 1 && text[1] == ' ') {
-        values_[key].second += " " + trimmed(text.substr(1));
+        values_[key].second += " " + std::string(trimmed(text.substr(1)));
         return;
       }
       const size_t colon = text.find(':');
       if (colon == std::string::npos)
-        throw InputError({path, line}, "'" + text + "' is no 'key: value'");
+        throw InputError({path, line}, "'" + text + "' is not a 'key: value'");
       key = trimmed(text.substr(0, colon));
-      std::string value = trimmed(text.substr(colon + 1));
+      std::string value(trimmed(text.substr(colon + 1)));
       if (value.size() >= 2 && (value.front() == '"' || value.front() == '\'') &&
           value.back() == value.front())
         value = value.substr(1, value.size() - 2);
@@ -97,7 +92,7 @@ class FlatYaml {
       if (std::find(known.begin(), known.end(), key) != known.end()) continue;
       const std::string near = nearest_word(key, known);
       findings.unsupported({path_, value.first}, shortened(key, kLongestShown),
-                           "is no key of map_server's, and ignored" +
+                           "is not a key of map_server's, and ignored" +
                                (near.empty() ? "" : "; did you mean " + near + "?"));
     }
   }
@@ -163,7 +158,7 @@ cv::Mat read_picture(const std::string& path) {
     throw InputError({path, 0}, "the picture is broken");
   }
   if (grey.empty())
-    throw InputError({path, 0}, "is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+    throw InputError({path, 0}, "is not a picture that can be read (pgm, png, jpeg, bmp, tiff)");
   return grey;
 }
 
@@ -304,7 +299,7 @@ class ArMap {
     });
     if (!is_map_)
       throw InputError({path, 1},
-                       "is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
+                       "is not a map of MobileSim and ARIA: it does not begin with '2D-Map'");
     if (lines_.empty() && point_count_ == 0)
       throw InputError({path, 0}, "holds no LINES and no DATA");
     if (lines_.empty() && point_count_ > points_.size()) refuse_count(0);

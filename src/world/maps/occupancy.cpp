@@ -7,10 +7,11 @@
 #include <utility>
 
 #include "base/progress.h"
+#include "base/text.h"
 #include "base/whole.h"
 #include "ruedo/math.h"
+#include "world/model/bounds.h"
 #include "world/model/convex.h"
-#include "world/read/geometry.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {

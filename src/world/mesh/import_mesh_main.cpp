@@ -22,14 +22,16 @@
 #include <assimp/scene.h>
 #include <assimp/Importer.hpp>
 
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/input_file.h"
 #include "system/file_handle.h"
 #include "system/sandbox.h"
 #include "world/convex/convex_pieces.h"
+#include "world/document/document.h"
 #include "world/mesh/mesh_format.h"
-#include "world/read/document.h"
 
 namespace fs = std::filesystem;
 using namespace ruedo::world;
@@ -319,6 +321,19 @@ void write(const MeshPackage& package, int output) {
     throw std::runtime_error(std::string("the result cannot be written: ") + std::strerror(errno));
 }
 
+// What is too large, the limit, and what helps. Allocates nothing: the memory is used up.
+void say_too_large(const char* path) {
+  struct stat file{};
+  if (*path != '\0') ::stat(path, &file);
+  rlimit limit{};
+  ::getrlimit(RLIMIT_AS, &limit);
+  std::fprintf(stderr,
+               "importing its %.1f MB needs more than the %.1f GiB of memory that an importer may "
+               "use; reduce it to about 2 000 000 triangles, or split it into several files\n",
+               static_cast<double>(file.st_size) * 1e-6,
+               static_cast<double>(limit.rlim_cur) / (1 << 30));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -345,7 +360,7 @@ int main(int argc, char** argv) {
     }
     return 0;
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "it needs more memory than is allowed\n");
+    say_too_large(divides ? "" : argv[1]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
   }

@@ -172,7 +172,7 @@ MeshPackage unpack_mesh(std::string_view bytes) {
   if (check != content_hash(bytes)) throw std::runtime_error("its check sum is wrong");
 
   Reader in(bytes);
-  if (in.value<uint32_t>() != kMagic) throw std::runtime_error("it is no mesh");
+  if (in.value<uint32_t>() != kMagic) throw std::runtime_error("it is not a mesh");
   if (in.value<uint32_t>() != kMeshFormatVersion)
     throw std::runtime_error("it is of another version");
   MeshPackage package;

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::world {
 

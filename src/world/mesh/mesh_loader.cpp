@@ -18,8 +18,8 @@
 #include "system/child_process.h"
 #include "system/file_handle.h"
 #include "system/installation.h"
+#include "world/document/document.h"
 #include "world/mesh/mesh_format.h"
-#include "world/read/document.h"
 
 namespace fs = std::filesystem;
 
@@ -177,7 +177,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
     if (fs::is_directory(file, error)) throw std::runtime_error("it is a folder; a file is needed");
     throw std::runtime_error(
         (extension.empty() ? "a name without an extension" : "'" + extension + "'") +
-        " is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
+        " is not a known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
   }
   const std::string content = bytes_of(path, MeshLimits::kFileBytes);
   files_.push_back(path);

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "world/mesh/mesh.h"
+#include "world/document/load_budget.h"
+#include "world/document/resources.h"
 #include "world/mesh/texture_store.h"
-#include "world/read/load_budget.h"
-#include "world/read/resources.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::world {
 

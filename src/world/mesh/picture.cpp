@@ -120,7 +120,7 @@ std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   const Size size = size_of(Bytes(span));
   // For another kind, only its decoder could tell how much memory it needs.
   if (size.width <= 0 || size.height <= 0)
-    return "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)";
+    return "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)";
   if (size.white != 255 && size.white != 65535)
     return "its white is " + std::to_string(size.white) +
            "; allowed are 255 and 65535: save it with one of these";

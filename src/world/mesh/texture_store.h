@@ -9,7 +9,7 @@
 #include <string>
 
 #include "ruedo/errors.h"
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::world {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "world/read/geometry.h"
+#include "world/model/bounds.h"
 
 namespace ruedo::world {
 namespace {

@@ -154,7 +154,9 @@ std::string check_fault(const Fault& fault) {
   }
   if (!(std::abs(fault.x) <= kFarthest_m && std::abs(fault.y) <= kFarthest_m &&
         std::isfinite(fault.heading)))
-    return "its place is no place";
+    return fmt::format(
+        "the place {} {} {} is not allowed; allowed are x and y within {} m, and a finite heading",
+        fault.x, fault.y, fault.heading, kFarthest_m);
   return "";
 }
 

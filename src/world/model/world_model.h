@@ -16,8 +16,8 @@
 #include "ruedo/element.h"
 #include "ruedo/index.h"
 #include "ruedo/pose.h"
-#include "world/mesh/mesh.h"
 #include "world/model/fault.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::world {
 

@@ -119,7 +119,7 @@ Pose FrameGraph::placed(const Node& node, Pose X) {
                node.placement_frame != node.scope->model->name &&
                node.placement_frame != node.name) {
       node.element->fail("placement_frame '" + node.placement_frame +
-                         "' is no frame of the model '" + node.scope->model->name + "'");
+                         "' is not a frame of the model '" + node.scope->model->name + "'");
     }
   }
   return X.normalized();

@@ -22,7 +22,4 @@ Mesh extruded(const std::vector<std::vector<Eigen::Vector2d>>& polygons, double 
 // Throws std::runtime_error for a picture that cannot be read.
 Mesh heightmap(const std::string& picture, const Vec3& size);
 
-// The corners of a shape's bounding box, in the shape's frame. Planes have none.
-Eigen::AlignedBox3d bounds(const Geometry& geometry);
-
 }  // namespace ruedo::world

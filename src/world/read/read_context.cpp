@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "world/read/reserved_names.h"
+#include "world/document/reserved_names.h"
 
 namespace ruedo::world {
 
@@ -53,12 +53,6 @@ std::string dotted(const std::string& scoped) {
   for (size_t at = result.find("::"); at != std::string::npos; at = result.find("::", at))
     result.replace(at, 2, ".");
   return result;
-}
-
-std::string shown(double value) {
-  char buffer[32];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  return {buffer, end};
 }
 
 }  // namespace ruedo::world

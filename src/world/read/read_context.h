@@ -6,11 +6,11 @@
 
 #include "base/option_text.h"
 #include "ruedo/element.h"
+#include "world/document/controller_files.h"
+#include "world/document/document.h"
+#include "world/document/resources.h"
 #include "world/mesh/mesh_loader.h"
 #include "world/mesh/texture_store.h"
-#include "world/read/controller_files.h"
-#include "world/read/document.h"
-#include "world/read/resources.h"
 #include "world/read/triangle_count.h"
 
 namespace ruedo::world {
@@ -70,8 +70,5 @@ bool read_or_leave_out(const std::string& where, const std::string& what, Findin
 
 // From "arm::wrist", SDF's scoped name, to "arm.wrist", as in channel names.
 std::string dotted(const std::string& scoped);
-
-// A number for messages: 0.5, not 0.500000.
-std::string shown(double value);
 
 }  // namespace ruedo::world

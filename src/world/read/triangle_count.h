@@ -10,7 +10,7 @@
 
 #include "ruedo/element.h"
 #include "ruedo/pose.h"
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 
 namespace ruedo::world {
 

@@ -8,7 +8,7 @@
 
 #include "base/whole.h"
 #include "ruedo/random.h"
-#include "world/model/placement.h"
+#include "world/drives/placement.h"
 #include "world/read/read_context.h"
 #include "world/sdf/sdf_reader.h"
 

@@ -5,10 +5,11 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "base/text.h"
 #include "base/whole.h"
 #include "ruedo/math.h"
 #include "ruedo/random.h"
-#include "world/model/placement.h"
+#include "world/drives/placement.h"
 #include "world/sdf/sdf_reader.h"
 
 namespace ruedo::world {
@@ -152,7 +153,7 @@ void SdfReader::read_fleet(const Element& element, WorldModel& world, size_t mos
   }
   const auto included = include(*includes[0], "world/ruedo:fleet");
   if (!included) return;  // not found, which has been reported
-  if (!included->model) includes[0]->fail("is no model; a fleet is of models");
+  if (!included->model) includes[0]->fail("is not a model; a fleet is of models");
   const auto model = included->model->model;
   const Fleet fleet(element, *model);
   if (world.models.size() + static_cast<size_t>(fleet.count) > most_models) {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "world/read/degrees.h"
+#include "world/document/degrees.h"
+#include "world/document/reserved_names.h"
 #include "world/read/no_effect.h"
-#include "world/read/reserved_names.h"
 #include "world/sdf/include_params.h"
 #include "world/sdf/sdf_reader.h"
 #include "world/urdf/urdf.h"
@@ -55,12 +55,12 @@ SdfVersion SdfReader::version_of(const Element& root) {
     root.fail(
         "this is the format of Gazebo before 1.0; Ruedo reads SDF 1.4 to 1.12 (gz sdf -p converts "
         "it)");
-  if (root.name != "sdf") root.fail("is no SDF: the root element is not <sdf>");
+  if (root.name != "sdf") root.fail("is not SDF: the root element is not <sdf>");
   const std::string* written = root.attribute("version");
   if (!written)
     root.fail("has no version; the attribute version is required, as in version=\"1.9\"");
   const auto version = SdfVersion::parse(*written);
-  if (!version) root.fail("version '" + *written + "' is no version; allowed are 1.4 to 1.12");
+  if (!version) root.fail("version '" + *written + "' is not a version; allowed are 1.4 to 1.12");
   if (*version < SdfVersion{1, 3})
     root.fail("version '" + *written + "' is too old; allowed are 1.4 to 1.12");
   if (version->major > 1)

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "world/sdf/sdf_reader.h"
 
 namespace ruedo::world {
@@ -125,7 +126,7 @@ void read_mimic(const Element& element, const IndexedVector<ModelJointIndex, Joi
   const std::string name = dotted(*written);
   const auto leader = std::find_if(joints.begin(), joints.end(),
                                    [&](const Joint& each) { return each.name == name; });
-  if (leader == joints.end()) mimic->fail("joint '" + name + "' is none of the model's joints");
+  if (leader == joints.end()) mimic->fail("joint '" + name + "' is not one of the model's joints");
   if (leader->type == JointType::fixed || leader->type == JointType::ball)
     mimic->fail("joint '" + name + "' has no position to follow");
   for (const Joint* each = &*leader;; each = &joints[each->leader]) {

@@ -7,8 +7,10 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "world/mesh/material.h"
+#include "base/text.h"
+#include "world/model/bounds.h"
 #include "world/read/geometry.h"
+#include "world/read/material.h"
 
 namespace ruedo::world {
 namespace {
@@ -343,17 +345,6 @@ SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const
   sensor.X_LS = X_LS;
   sensor.element = element.clone();
   return sensor;
-}
-
-void collect_plugins(const Element& element, std::vector<const Element*>& plugins) {
-  for (const auto& child : element.children) {
-    if (child->name == "plugin")
-      plugins.push_back(child.get());
-    else if (child->name == "link" || child->name == "sensor" || child->name == "visual" ||
-             child->name == "camera") {
-      collect_plugins(*child, plugins);
-    }
-  }
 }
 
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,

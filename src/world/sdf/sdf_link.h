@@ -27,7 +27,4 @@ Light read_light(const Element& element, const Pose& pose, const std::string& wh
 // A sensor, with its name as written except that "::" becomes ".".
 SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const Pose& X_LS);
 
-// The plugins of a sensor in a file whose layout differs from SDF.
-void collect_plugins(const Element& element, std::vector<const Element*>& plugins);
-
 }  // namespace ruedo::world

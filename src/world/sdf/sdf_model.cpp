@@ -5,9 +5,9 @@
 #include "world/compat/plugins.h"
 #include "world/compat/sensor_plugins.h"
 #include "world/compat/visual_plugins.h"
-#include "world/model/drive.h"
-#include "world/model/joint_start.h"
-#include "world/read/reserved_names.h"
+#include "world/document/reserved_names.h"
+#include "world/drives/drive.h"
+#include "world/drives/joint_start.h"
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 
@@ -375,7 +375,7 @@ std::optional<Nested> SdfReader::ModelReader::nested_part(const Element& child) 
     part.merged = child.attribute("merge") != nullptr;  // merged because of a joint of the world
   } else {
     auto included = reader_.include(child, where_ + "/include");
-    if (included && !included->model) child.fail("is no model; a model can include models only");
+    if (included && !included->model) child.fail("is not a model; a model can include models only");
     if (included) part.scope = included->model, part.name = included->name;
     const std::string* merge = child.attribute("merge");
     part.merged = merge && (*merge == "true" || *merge == "1");
@@ -446,7 +446,7 @@ ModelLinkIndex SdfReader::ModelReader::canonical_link() {
   if (const std::string* name = element_.attribute("canonical_link"); name && !name->empty()) {
     read_or_leave_out(where_, "its first link is taken", findings_, [&] {
       const ModelLinkIndex link = frames_.link(*name, element_);
-      if (!link.valid()) element_.fail("canonical_link '" + *name + "' is no link");
+      if (!link.valid()) element_.fail("canonical_link '" + *name + "' is not a link");
       canonical = link;
     });
   }
@@ -475,14 +475,14 @@ void SdfReader::ModelReader::read_plugin_sensors() {
       if (made.joint.empty()) {
         const ModelLinkIndex link =
             made.link.empty() ? ModelLinkIndex(0) : frames_.link(made.link, *plugin);
-        if (!link.valid()) plugin->fail("'" + made.link + "' is no link");
+        if (!link.valid()) plugin->fail("'" + made.link + "' is not a link");
         model_->sensors.push_back(read_sensor(*made.sensor, link, pose));
         return;
       }
       const auto joint =
           std::find_if(model_->joints.begin(), model_->joints.end(),
                        [&](const Joint& each) { return each.name == dotted(made.joint); });
-      if (joint == model_->joints.end()) plugin->fail("'" + made.joint + "' is no joint");
+      if (joint == model_->joints.end()) plugin->fail("'" + made.joint + "' is not a joint");
       model_->sensors.push_back(joint_sensor(*made.sensor, *joint, joint->X_MJ * pose, *model_));
     });
   }
@@ -520,7 +520,7 @@ void SdfReader::ModelReader::read_mimic_plugin(const Element& plugin) {
     const auto found = std::find_if(model_->joints.begin(), model_->joints.end(),
                                     [&](const Joint& each) { return each.name == name; });
     if (found == model_->joints.end())
-      plugin.fail(std::string("<") + what + ">: '" + name + "' is none of the model's joints");
+      plugin.fail(std::string("<") + what + ">: '" + name + "' is not one of the model's joints");
     return *found;
   };
   const Joint& leader = named("joint");

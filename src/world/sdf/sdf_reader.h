@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "world/document/sdf_version.h"
 #include "world/model/world_model.h"
 #include "world/read/frames.h"
 #include "world/read/read_context.h"
-#include "world/read/sdf_version.h"
 
 namespace ruedo::world {
 

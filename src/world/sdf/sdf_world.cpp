@@ -4,16 +4,17 @@
 #include <map>
 #include <set>
 
+#include "base/text.h"
 #include "base/whole.h"
 #include "world/compat/plugin_parameters.h"
 #include "world/compat/plugins.h"
-#include "world/edit/saved_state.h"
-#include "world/mesh/material.h"
-#include "world/model/environment.h"
+#include "world/document/reserved_names.h"
+#include "world/drives/placement.h"
 #include "world/model/own_plugins.h"
-#include "world/model/placement.h"
-#include "world/read/reserved_names.h"
+#include "world/read/material.h"
 #include "world/sdf/crowd.h"
+#include "world/sdf/environment.h"
+#include "world/sdf/saved_state.h"
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 

@@ -11,8 +11,10 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include "world/model/drive.h"
-#include "world/read/degrees.h"
+#include "base/text.h"
+#include "base/xml.h"
+#include "world/document/degrees.h"
+#include "world/drives/drive.h"
 #include "world/read/no_effect.h"
 #include "world/read/read_context.h"
 #include "world/urdf/urdf_format.h"
@@ -34,27 +36,14 @@ class Listener : public console_bridge::OutputHandler {
   std::vector<std::string> errors;
 };
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '<': result += "&lt;"; break;
-      case '&': result += "&amp;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
-    }
-  }
-  return result;
-}
-
 // Serialises elements for urdfdom, without the parts it does not read.
 void write_xml(const Element& element, std::string& out) {
   if (element.name == "gazebo" || element.name == "transmission" || element.name == "ros2_control")
     return;
   out += "<" + element.name;
   for (const auto& [name, value] : element.attributes)
-    out += " " + name + "=\"" + escaped(value) + "\"";
-  out += ">" + escaped(element.text);
+    out += " " + name + "=\"" + xml_escaped(value) + "\"";
+  out += ">" + xml_escaped(element.text);
   for (const auto& child : element.children) write_xml(*child, out);
   out += "</" + element.name + ">";
 }

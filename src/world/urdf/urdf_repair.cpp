@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {

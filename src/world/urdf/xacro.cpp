@@ -105,7 +105,7 @@ std::vector<std::string> interpreter_for(const std::string& path) {
   if (parts.empty()) {
     std::istringstream lines(output_of(path, {xacro_python(), script(), "--parts"}, limits()));
     for (std::string line; std::getline(lines, line);) parts.push_back(line);
-    if (parts.empty()) fail(path, xacro_python() + " is no Python");
+    if (parts.empty()) fail(path, xacro_python() + " is not a Python interpreter");
   }
   return parts;
 }

@@ -26,9 +26,9 @@ const auto kKnown = [](const EarlyMessages::Message& each) { return each.writer 
 
 TEST(EarlyMessages, AreHeardInOrderOnceTheirWriterIsKnown) {
   EarlyMessages messages;
-  messages.hold(early(1), kBegin);
-  messages.hold(early(2, kOther), kBegin);
-  messages.hold(early(3), kBegin);
+  messages.keep(early(1), kBegin);
+  messages.keep(early(2, kOther), kBegin);
+  messages.keep(early(3), kBegin);
   EXPECT_FALSE(messages.due(kBegin + 1s));
   messages.look(kKnown, kBegin + 1s);
   EXPECT_FALSE(messages.due(kBegin + 1s));
@@ -45,8 +45,8 @@ TEST(EarlyMessages, AreHeardInOrderOnceTheirWriterIsKnown) {
 
 TEST(EarlyMessages, AreNotHeldForEver) {
   EarlyMessages messages;
-  messages.hold(early(1), kBegin);
-  messages.hold(early(2), kBegin + EarlyMessages::kLongest + 1s);
+  messages.keep(early(1), kBegin);
+  messages.keep(early(2), kBegin + EarlyMessages::kLongest + 1s);
   messages.look(kKnown, kBegin + 10s);
   size_t heard = 0;
   while (const auto next = messages.due(kBegin + 20s)) {
@@ -70,11 +70,11 @@ TEST(EarlyMessages, AreHeardBeforeTheirWritersHeartbeats) {
   using Kinds = std::vector<uint8_t>;
   EarlyMessages messages;
   EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));
-  messages.hold(early(1, kOther), kBegin);
+  messages.keep(early(1, kOther), kBegin);
   EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));
   EarlyMessages::Message own = early(1);
   own.participant.fill(7);
-  messages.hold(own, kBegin);
+  messages.keep(own, kBegin);
   EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));  // nor to Cyclone
   messages.look(kKnown, kBegin);
   EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kNothing}));
@@ -84,13 +84,13 @@ TEST(EarlyMessages, AreHeardBeforeTheirWritersHeartbeats) {
 
 TEST(EarlyMessages, AreBoundedInNumberAndBytes) {
   EarlyMessages messages;
-  for (size_t i = 0; i < 2 * EarlyMessages::kMost; ++i) messages.hold(early(1), kBegin);
+  for (size_t i = 0; i < 2 * EarlyMessages::kMost; ++i) messages.keep(early(1), kBegin);
   messages.look(kKnown, kBegin);
   size_t heard = 0;
   while (messages.due(kBegin + 10s)) ++heard;
   EXPECT_EQ(heard, EarlyMessages::kMost * EarlyMessages::kDelays.size());
   for (size_t i = 0; i < 3; ++i)
-    messages.hold(early(1, kWriter, EarlyMessages::kMostBytes / 2), kBegin);
+    messages.keep(early(1, kWriter, EarlyMessages::kMostBytes / 2), kBegin);
   messages.look(kKnown, kBegin);
   for (heard = 0; messages.due(kBegin + 10s);) ++heard;
   EXPECT_EQ(heard, 2 * EarlyMessages::kDelays.size());

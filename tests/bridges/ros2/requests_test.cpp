@@ -27,8 +27,8 @@ struct FakeRun {
 
   FakeRun() { requests.listen("ruedo/request"); }
   void ask(uint64_t client, uint8_t mark = 0) {
-    requests.ask(client, request_t::GET_STATE, {mark},
-                 [this](const reply_t& reply) { answers.push_back(reply.code); });
+    requests.send(client, request_t::GET_STATE, {mark},
+                  [this](const reply_t& reply) { answers.push_back(reply.code); });
   }
   void answer(const request_t& request, int32_t code = reply_t::OK, int64_t session = 7) {
     reply_t reply{};
@@ -80,7 +80,7 @@ TEST(Requests, StepsThatTakeForEverLeaveRoom) {
   FakeRun run;
   run.join();
   for (uint64_t client = 1; client <= 9; ++client)
-    run.requests.ask(client, request_t::STEP, {0}, [](const reply_t&) {});
+    run.requests.send(client, request_t::STEP, {0}, [](const reply_t&) {});
   EXPECT_EQ(run.got.size(), Requests::kMostSteps);
   run.ask(9);
   EXPECT_EQ(run.got.size(), Requests::kMostSteps) << "behind a STEP of its own";

@@ -28,7 +28,7 @@
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/world_info_t.hpp"
 #include "server_process.h"
-#include "transport.h"
+#include "transport/transport.h"
 
 namespace ruedo::client {
 

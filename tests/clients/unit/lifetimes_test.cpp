@@ -518,10 +518,11 @@ TEST_F(Lifetimes, WhatACallbackThrowsTheNextCallThrowsAndItHurtsNobody) {
   for (int i = 1; i <= 3; ++i) server->send_odometry("p3at", 1000 * i, 0.0);
   server->await_delivery();
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "ruedo: a callback on p3at/odometry failed: what it threw is no std::exception; it is "
-            "called on, and this is said once\n"
-            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, "
-            "and this is said once\n");
+            "ruedo: a callback on p3at/odometry failed: it threw something other than a "
+            "std::exception; it "
+            "stays subscribed (shown once)\n"
+            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it stays subscribed "
+            "(shown once)\n");
   EXPECT_EQ(heard, 3);
   EXPECT_THROW((void)odometry.latest(), std::runtime_error);
   EXPECT_EQ(odometry.latest().utime, 3000);
@@ -624,8 +625,8 @@ TEST_F(Lifetimes, AnotherServersSignsEndNothing) {
   server->await_delivery();
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
             "ruedo: another server is at memq://, too, with run 8; this client is in run 7, world "
-            "memory. Samples of both mix, and commands go to both: give one of them another --lcm "
-            "port (this is said once)\n");
+            "memory. Their samples mix, and commands reach both: start one of them with another "
+            "--lcm port (shown once)\n");
   EXPECT_EQ(motion.state(), MotionState::running);
   EXPECT_EQ(events, 0);
   EXPECT_LT(sim.time(), 1.0);

@@ -90,8 +90,8 @@ TEST_F(Receiving, CallbacksThatAreTooSlowGetTheNewest) {
   go_on.set_value();
   server->await_delivery();
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "ruedo: callbacks are slower than their samples come: they get the newest of each "
-            "channel alone, and the streams' dropped() counts the others (this is said once)\n");
+            "ruedo: callbacks are slower than their samples: they get only the newest sample of "
+            "each channel, and dropped() of each stream counts the others (shown once)\n");
   EXPECT_EQ(last, kSent);
   EXPECT_LT(calls, kSent / 2);
   EXPECT_EQ(calls + odometry.dropped(), kSent);

@@ -81,7 +81,7 @@ export class Connection implements LinkHandler {
       hello?.mode === "log"
         ? "A recorded run cannot be steered."
         : isRequest
-          ? "This run takes no requests (--control off)."
+          ? "This run accepts no requests (--control off)."
           : `Nobody listens on ${channel}.`,
       "error",
     );

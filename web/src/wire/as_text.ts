@@ -39,7 +39,7 @@ export function checkedMessage(type: string, value: unknown, at = ""): Record<st
   const given = value as Record<string, unknown>;
   const odd = Object.keys(given).find((name) => !fields.some((field) => field.name === name));
   if (odd !== undefined)
-    throw new Error(`${path(odd)} is none of ${fields.map(({ name }) => name).join(", ")}`);
+    throw new Error(`${path(odd)} is not one of ${fields.map(({ name }) => name).join(", ")}`);
   const message: Record<string, unknown> = {};
   for (const field of fields) {
     if (!(field.name in given)) throw new Error(`${path(field.name)} is missing`);

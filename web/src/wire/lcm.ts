@@ -150,7 +150,7 @@ function countOf(field: Field, message: Record<string, Value>): number {
 // Throws RangeError if the bytes are not such a message.
 export function decode<T extends TypeName>(type: T, bytes: Uint8Array): Messages[T] {
   const reader = new Reader(bytes);
-  if (reader.one("int64_t") !== fingerprint(type)) throw new RangeError(`this is no ${type}`);
+  if (reader.one("int64_t") !== fingerprint(type)) throw new RangeError(`this is not a ${type}`);
   const message = reader.struct(type);
   if (reader.at !== bytes.length)
     throw new RangeError(`a ${type} with ${bytes.length - reader.at} bytes left over`);

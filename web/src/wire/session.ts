@@ -100,7 +100,7 @@ export class Session {
   }
 
   private async once(asked: Asked): Promise<reply_t> {
-    if (!this.requestChannel) throw new Error("this simulation takes no requests");
+    if (!this.requestChannel) throw new Error("this simulation accepts no requests");
     if (this.session === 0n) {
       const random = crypto.getRandomValues(new Uint32Array(1))[0]! >>> 1;
       const body = encode("join_t", { client: `console-${random.toString(16)}` });

@@ -44,7 +44,7 @@ final class Address {
         String scheme = url.substring(0, at);
         String rest = url.substring(at + 3);
         if (scheme.equals("unix")) {
-            if (!rest.startsWith("/")) throw refused("'" + rest + "' is no absolute path");
+            if (!rest.startsWith("/")) throw refused("'" + rest + "' is not an absolute path");
             path = rest;
             multicast = false;
             host = "";
@@ -88,7 +88,7 @@ final class Address {
 
     private int port(String digits) {
         int port = number(digits, 1, 65535);
-        if (port < 0) throw refused("'" + digits + "' is no port");
+        if (port < 0) throw refused("'" + digits + "' is not a port");
         return port;
     }
 
@@ -97,7 +97,7 @@ final class Address {
         boolean good = bytes.length == 4 && number(bytes[0], 224, 239) >= 0;
         for (String value : bytes) good = good && number(value, 0, 255) >= 0;
         if (good) return text;
-        throw refused("'" + text + "' is no multicast group (224.0.0.0 to 239.255.255.255)");
+        throw refused("'" + text + "' is not a multicast group (224.0.0.0 to 239.255.255.255)");
     }
 
     private String resolved(String name) {
@@ -107,7 +107,7 @@ final class Address {
         } catch (UnknownHostException error) {
             // said below
         }
-        throw refused("'" + name + "' is no host that this machine knows");
+        throw refused("'" + name + "' is not a host that this machine knows");
     }
 
     private Map<String, Integer> options(String text) {
@@ -174,7 +174,7 @@ final class Address {
             throw new RuedoException.NoServer(
                     url
                             + ": this machine has no route for multicast. On Linux: "
-                            + "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more");
+                            + "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` explains");
         }
         try {
             probe();

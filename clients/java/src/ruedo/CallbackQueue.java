@@ -103,9 +103,9 @@ final class CallbackQueue {
         if (all || droppingTold) return;
         droppingTold = true;
         System.err.println(
-                "ruedo: callbacks are slower than their samples come: they get the newest of each"
-                        + " channel alone, and the streams' dropped() counts the others (this is"
-                        + " said once)");
+                "ruedo: callbacks are slower than their samples: they get only the newest sample"
+                        + " of each channel, and dropped() of each stream counts the others"
+                        + " (shown once)");
     }
 
     /** Until drain() the caller's thread runs what comes, then. */

@@ -31,7 +31,7 @@ final class Driver {
     }
 
     /** Publishes the command now, and again until the next one. */
-    void hold(String channel, byte[] bytes) {
+    void keepSending(String channel, byte[] bytes) {
         listen();
         synchronized (this) {
             if (!ended.isEmpty()) return;

@@ -44,7 +44,7 @@ public final class Log {
         if (!new File(path).isFile()) {
             boolean there = new File(path).exists();
             throw new RuedoException(
-                    path + (there ? ": it is no file that can be read" : ": no such file"));
+                    path + (there ? ": it is not a file that can be read" : ": no such file"));
         }
         try (RandomAccessFile file = new RandomAccessFile(path, "r")) {
             long begin = 0;
@@ -53,7 +53,7 @@ public final class Log {
             throw new RuedoException(path + ": " + error.getMessage());
         }
         if (!fault.isEmpty() && places.isEmpty())
-            throw new RuedoException(path + ": it is no LCM log: " + fault);
+            throw new RuedoException(path + ": it is not an LCM log: " + fault);
     }
 
     /** Where the next one begins; -1 where the log was cut off, or is damaged. */

@@ -43,7 +43,7 @@ public final class Marker {
     public static Marker lines(double[][] points, float[] color, double width) {
         require(
                 points.length % 2 == 0,
-                "lines have two ends each; " + points.length + " points are no pairs");
+                "lines have two ends each; " + points.length + " points do not make pairs");
         return new Marker(marker_t.LINES, color, width).withPoints(points);
     }
 
@@ -80,7 +80,7 @@ public final class Marker {
             float[] color) {
         require(
                 columns >= 1 && cells.length > 0 && cells.length % columns == 0,
-                cells.length + " cells are no rows of " + columns);
+                cells.length + " cells do not fill rows of " + columns);
         Marker marker = new Marker(marker_t.MAP, color, resolution).at(place, heading);
         marker.message.columns = columns;
         marker.message.ncells = cells.length;

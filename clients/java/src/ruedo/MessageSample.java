@@ -40,7 +40,7 @@ public final class MessageSample<M> extends Sample {
                     fingerprint, in -> decode(constructor, in.whole()), false, type.getName());
         } catch (ReflectiveOperationException error) {
             throw new IllegalArgumentException(
-                    type.getName() + " is no class that lcm-gen made of an .lcm file");
+                    type.getName() + " is not a class that lcm-gen made of an .lcm file");
         }
     }
 

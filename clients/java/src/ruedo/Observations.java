@@ -104,7 +104,7 @@ public final class Observations extends State {
         } catch (IOException error) {
             throw new RuedoException.TypeMismatch(
                     stream.channel
-                            + ": a message is no valid "
+                            + ": a message is not a valid "
                             + stream.type
                             + ": "
                             + error.getMessage());

@@ -206,13 +206,13 @@ public final class Robot {
      */
     public void setVelocity(double v, double omega, double vy) {
         Command command = velocityCommand(v, omega, vy);
-        driver("velocityCommand(v, omega)").hold(command.channel, command.data);
+        driver("velocityCommand(v, omega)").keepSending(command.channel, command.data);
     }
 
     /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */
     public void setWheels(double left, double right) {
         Command command = wheelCommand(left, right);
-        driver("wheelCommand(left, right)").hold(command.channel, command.data);
+        driver("wheelCommand(left, right)").keepSending(command.channel, command.data);
     }
 
     /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */

@@ -252,7 +252,7 @@ final class ServerProcess {
         if (named != null && !named.isEmpty()) {
             if (isProgram(new File(named))) return named;
             throw new RuedoException.LaunchError(
-                    "the environment's RUEDO is '" + named + "', which is no program");
+                    "the environment's RUEDO is '" + named + "', which is not a program");
         }
         List<File> above = foldersAbove();
         List<File> candidates = new ArrayList<>();

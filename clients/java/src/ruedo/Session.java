@@ -313,7 +313,7 @@ final class Session {
             return reader.read(in);
         } catch (IOException error) {
             throw new RuedoException.TypeMismatch(
-                    "the reply's body is no "
+                    "the reply's body is not a "
                             + type
                             + " of this client's version: "
                             + error.getMessage());

@@ -352,7 +352,7 @@ public final class Simulation extends Requests implements AutoCloseable {
             bus.publish(channel.name, Marker.message(layer, markers, frame));
             return;
         }
-        throw new RuedoException.NotSupported("this server takes no markers");
+        throw new RuedoException.NotSupported("this server does not accept markers");
     }
 
     /** The same, in the world. */
@@ -569,7 +569,7 @@ public final class Simulation extends Requests implements AutoCloseable {
                 whyItStands(
                         () ->
                                 String.format(
-                                        "in lockstep it stands still between calls of step(), whose"
+                                        "in lockstep, sim time advances only in step(), whose"
                                             + " observations have the samples, as in"
                                             + " sim.step(20).latest(robot.lrf()); it is at %.2f s",
                                         time()));
@@ -768,8 +768,8 @@ public final class Simulation extends Requests implements AutoCloseable {
                         + info().head.run_id
                         + ", world "
                         + info().head.world
-                        + ". Samples of both mix, and commands go to both: give one of them another"
-                        + " --lcm port (this is said once)");
+                        + ". Their samples mix, and commands reach both: start one of them with"
+                        + " another --lcm port (shown once)");
     }
 
     private void awaitInfo(double timeout) {

@@ -217,7 +217,7 @@ final class Stepper {
                     throw new IOException("nobody stands there");
             } catch (IOException error) {
                 throw new RuedoException.TypeMismatch(
-                        "the reply to GRANT is no grant_reply_t of this client's version");
+                        "the reply to GRANT is not a grant_reply_t of this client's version");
             }
             runId = sim.info().head.run_id;
             epoch = reply.epoch;

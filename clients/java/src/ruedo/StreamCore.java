@@ -163,7 +163,7 @@ final class StreamCore<T extends Sample> {
                 channel
                         + ": a message of "
                         + message.length
-                        + " bytes is no valid "
+                        + " bytes is not a valid "
                         + type
                         + ": "
                         + error.getMessage());

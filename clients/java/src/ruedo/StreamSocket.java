@@ -189,7 +189,7 @@ final class StreamSocket implements Closeable {
                             .getMethod("of", String.class)
                             .invoke(null, path);
         } catch (ReflectiveOperationException error) {
-            throw new IOException(path + " is no path of a socket", error);
+            throw new IOException(path + " is not a path of a socket", error);
         }
     }
 }

@@ -72,7 +72,7 @@ public final class Subscription implements AutoCloseable {
             Faults.tell(
                     "a callback on " + what + " failed: ",
                     error,
-                    "; it is called on, and this is said once");
+                    "; it stays subscribed (shown once)");
         }
     }
 

@@ -226,7 +226,8 @@ final class WorldInfo {
                 for (byte[] message : whole) decoded.add(readPart(new WireReader(message)));
             } catch (IOException error) {
                 throw new RuedoException.TypeMismatch(
-                        "a message on ruedo/info is no valid world_info_t: " + error.getMessage());
+                        "a message on ruedo/info is not a valid world_info_t: "
+                                + error.getMessage());
             }
             last = content;
             return new WorldInfo(decoded);

@@ -53,7 +53,7 @@ class Policy:
         except (ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile):
             layers = []
         if not _fit(layers):
-            raise ValueError(f"{file}: is no policy that save() wrote")
+            raise ValueError(f"{file}: is not a policy that save() wrote")
         return cls(layers)
 
 

@@ -62,7 +62,7 @@ class Campaign:
             except OSError as error:
                 raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from None
             except UnicodeDecodeError as error:
-                raise SpecError(f"{file}: is no UTF-8: byte {error.start} is none") from None
+                raise SpecError(f"{file}: is not UTF-8: byte {error.start} is none") from None
             self._content, self.source = read_yaml(str(file), text)
             self.file, self.folder, stem = file.resolve(), file.resolve().parent, file.stem
         check(self._content, self.source)
@@ -244,7 +244,7 @@ class Campaign:
                 if HALF.search(path):
                     raise self.source.error(
                         ("controllers", i, "each"),
-                        f"is {one['each']!r}, and the name of {path!r} is no UTF-8: rename it",
+                        f"is {one['each']!r}, and the name of {path!r} is not UTF-8: rename it",
                     )
                 if not re.search(CONTROLLER_NAME, file.stem):
                     raise self.source.error(

@@ -449,7 +449,7 @@ def _line(error: BaseException) -> str:
 
 
 def _check_room(folders: Iterable[str]) -> None:
-    """Whatever went wrong with a case on a full disk is no fault of the case. Raises OSError."""
+    """Whatever went wrong with a case on a full disk is not a fault of the case. Raises OSError."""
     for folder in folders:
         with tempfile.TemporaryFile(dir=folder) as file:
             os.posix_fallocate(file.fileno(), 0, _ROOM)

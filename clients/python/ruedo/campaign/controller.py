@@ -97,7 +97,7 @@ def make_controller(thing: Any, parameters: dict[str, Any]) -> Callable[[View], 
     if not inspect.isclass(thing):
         if not callable(thing):
             raise TypeError(
-                f"{thing!r} is no controller: a function of a View, or a class of such objects"
+                f"{thing!r} is not a controller: a function of a View, or a class of such objects"
             )
         return thing
     make: Any = thing

@@ -67,7 +67,7 @@ class Function:
             return sys.modules[name]
         spec = importlib.util.spec_from_file_location(name, self.file)
         if spec is None or not isinstance(spec.loader, importlib.machinery.SourceFileLoader):
-            raise ValueError(f"{self.file} is no Python file")
+            raise ValueError(f"{self.file} is not a Python file")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         try:

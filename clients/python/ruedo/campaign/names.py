@@ -69,7 +69,7 @@ def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
     done = subprocess.run(diff_command(expect, golden, golden), capture_output=True, text=True)
     if done.returncode != 0:
         lines = (done.stderr + done.stdout).splitlines()
-        said = next((line for line in lines if line and "warning: " not in line), "it is no log")
+        said = next((line for line in lines if line and "warning: " not in line), "it is not a log")
         at = "golden"
         if golden not in said and done.returncode != 1:  # it is a rule that is wrong
             at = "ignore" if "--ignore" in said else "tolerances"

@@ -83,7 +83,7 @@ def substitute(value: Any, names: dict[str, Any], wrong: Callable[[str], Excepti
     def named(match: re.Match[str]) -> Any:
         if match.group(1) not in names:
             raise wrong(
-                f"{{{match.group(1)}}} is no parameter; there are {', '.join(sorted(names))} "
+                f"{{{match.group(1)}}} is not a parameter; there are {', '.join(sorted(names))} "
                 "(a brace of your own is written twice, {{ and }})"
             )
         return names[match.group(1)]
@@ -238,7 +238,7 @@ def _check_parameter(name: str, given: Any, source: Source) -> None:
     ):
         raise source.error(
             ("parameters", name),
-            "is no name of a parameter: letters, digits and '_', and "
+            "is not a name of a parameter: letters, digits and '_', and "
             "not seed, case, world, robot, controller or folder",
         )
     kind = None if isinstance(given, list) else next(iter(given))

@@ -277,7 +277,7 @@ def _is_whole(_: Any, value: Any) -> bool:
 
 
 def _check_plain(value: Any, source: Source, path: tuple[Any, ...]) -> None:
-    """YAML has more than files: dates, sets, bytes, halves of characters, names that are no
+    """YAML has more than files: dates, sets, bytes, halves of characters, names that are not
     texts.
     """
     if isinstance(value, str) and HALF.search(value):

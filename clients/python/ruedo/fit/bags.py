@@ -117,7 +117,7 @@ def _scans(recording: Recording, time: list[float], values: list[Any]) -> Scans:
 
 
 def _wheels(recording: Recording, time: list[float], values: list[Any]) -> Wheels | None:
-    """The joints whose names say left and right; others are no wheels."""
+    """The joints whose names say left and right; others are not wheels."""
     names = list(values[0].name)
     sides = [
         [i for i, name in enumerate(names) if side in name.lower()] for side in ("left", "right")

@@ -45,7 +45,7 @@ def read_lcm(file: File, robot: str = "") -> Recording:
             try:
                 message = decode(getattr(lcmtypes, name), event.data)
             except Exception:
-                continue  # a message that is no valid one of its type
+                continue  # a message that does not decode as its type
             if name == "applied_t":  # when a command took effect
                 _add_command(found["velocity_command_t"], message)
                 continue
@@ -79,7 +79,7 @@ def _add_command(commands: dict[str, list[Any]], applied: Any) -> None:
         try:
             message = decode(lcmtypes.velocity_command_t, bytes(applied.data))
         except Exception:
-            return  # a message that is no valid one of its type
+            return  # a message that does not decode as its type
         message.utime = applied.utime
         commands.setdefault(applied.channel, []).append(message)
 

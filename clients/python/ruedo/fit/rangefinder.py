@@ -95,7 +95,7 @@ def valid(recording: Recording) -> NDArray[np.bool_]:
 def residuals_of(
     recording: Recording, mount: Array, scans: NDArray[np.int64], surfaces: Surfaces, seed: int = 0
 ) -> Residuals:
-    """Of these scans' readings; those of the same scan are no part of the surface."""
+    """Of these scans' readings; those of the same scan are not part of the surface."""
     poses = scan_poses(recording, mount)
     data = recording.scans
     assert data is not None
@@ -250,4 +250,4 @@ def _resolution(recording: Recording) -> list[Estimate]:
     for step in (0.05, 0.01, 0.005, 0.001):
         if np.mean(np.abs(values / step - np.round(values / step)) < 1e-3) > 0.999:
             return [Estimate("resolution", step, unit="m", why="all readings are multiples")]
-    return [Estimate("resolution", None, why="readings are no multiples of 1 mm or more")]
+    return [Estimate("resolution", None, why="readings are not multiples of 1 mm or more")]

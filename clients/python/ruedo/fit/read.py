@@ -24,7 +24,7 @@ def read(path: str | File, robot: str = "") -> Recording:
     """A recording from a file, or from the folder of a ROS 2 bag. robot: of an LCM log with
     several.
 
-    Raises FitError for what is no log or is damaged, OSError for what cannot be opened.
+    Raises FitError for a file that is not a log or is damaged, OSError for what cannot be opened.
     """
     file = File(path)
     if file.is_dir():

@@ -23,7 +23,7 @@ class Setting:
 
 
 def write_fitted(robot: File, settings: list[Setting], out: File, source: str) -> None:
-    """A copy of the model file `robot` with these values. Raises FitError where it is no SDF
+    """A copy of the model file `robot` with these values. Raises FitError where it is not SDF
     model.
     """
     text = robot.read_text(encoding="utf-8")

@@ -66,7 +66,7 @@ class SavedEpisodes(Saved):
 
 class MadeAnew:
     """Copied or pickled, an environment is made anew with the same arguments, as by Gymnasium's
-    EzPickle; it wants a reset.
+    EzPickle; it needs a reset().
     """
 
     _made_with: tuple[tuple[Any, ...], Info]

@@ -133,7 +133,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         if not isinstance(actions, dict):
             raise TypeError(f"actions are a dict, an action for each robot, not {actions!r}")
         if strangers := [name for name in actions if name not in self.possible_agents]:
-            raise ValueError(f"{strangers[0]!r} is none of {self.possible_agents}")
+            raise ValueError(f"{strangers[0]!r} is not one of {self.possible_agents}")
         commands = np.zeros((1, len(self.possible_agents), 2))
         for i, name in enumerate(self.possible_agents):
             if name in self.agents:

@@ -2,7 +2,7 @@
 
 - Observation, float32: Navigate-v0's terms, and between the goal and the speed the way in which the
   robot leans: the upward direction along its x axis (ahead) and its y axis (left), each in [-1, 1],
-  from the true pose. A level beam meets the hills; they are no obstacles.
+  from the true pose. A level beam meets the hills; they are not obstacles.
 - Action: as Navigate-v0's.
 - Reward: as Navigate-v0's.
 - An episode is terminated at the goal (nearer than 0.4 m), by touching a wall, or by leaning more

@@ -101,7 +101,7 @@ class Recorded:
                     )
                 steps, utime = state.step, state.utime
         if header is None:
-            raise SpecError(f"{path}: is no log of a run")
+            raise SpecError(f"{path}: is not a log of a run")
         seed = header.seed % 2**64  # a message has no unsigned numbers
         options = _options(header.options, path)
         return Recorded(path, header.world_file, seed, options, commands, steps)
@@ -305,7 +305,7 @@ def _case_of(path: str) -> tuple[Campaign, Case] | None:
     found = [case for case in campaign.cases if case.id == Path(path).stem]
     if not found:
         raise CampaignError(
-            f"{path}: its case is no case of {campaign.name} any more: its files were changed since"
+            f"{path}: its case is not a case of {campaign.name} any more: its files were changed since"
         )
     return campaign, found[0]
 
@@ -466,7 +466,7 @@ def _open_loop(recorded: Recorded, text: str, **changed: Any) -> tuple[str, bool
 
 
 def check_plot(file: str) -> None:
-    """Raises UsageError for a name by which it is no picture that can be drawn."""
+    """Raises UsageError for a name by which it is not a picture that can be drawn."""
     if not file.endswith(_PLOTS):
         raise UsageError(f"-o {file}: its name ends with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
 

@@ -124,8 +124,7 @@ class CallbackQueue:
         if dropped and not self._told:
             self._told = True
             log.warning(
-                "callbacks are slower than their samples come: they get the newest of each channel "
-                "alone, and the streams' `dropped` counts the others (this is said once)"
+                "callbacks are slower than their samples: they get only the newest sample of each channel, and `dropped` of each stream counts the others (shown once)"
             )
         return dropped
 

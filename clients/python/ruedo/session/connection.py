@@ -17,22 +17,22 @@ from typing import Any, Protocol
 
 from .. import lcmtypes
 from ..arguments import shown
-from ..transport.bus import Bus
-from .callback_queue import CallbackQueue
 from ..callbacks import Callbacks, Subscription
-from .clock import Clock
-from .control import REQUEST_CHANNEL, Session
 from ..errors import NoServer, RuedoError, RunEnded, UnknownName
 from ..lockstep import Stepper
 from ..motion import Drivers
+from ..stream import Streams
+from ..transport.bus import Bus
+from ..transport.transport import Transport, is_claimed, open_transport
+from ..world_info import WorldInfo, WorldInfoAssembler, run_id_of
+from .callback_queue import CallbackQueue
+from .clock import Clock
+from .control import REQUEST_CHANNEL, Session
 from .program_end import CallbackFaults
 from .progress import Progress, regression_at
 from .run_watch import RunWatch
 from .stack import is_in_another_call
 from .standstill import Standstill
-from ..stream import Streams
-from ..transport.transport import Transport, is_claimed, open_transport
-from ..world_info import WorldInfo, WorldInfoAssembler, run_id_of
 
 _SILENCE_SECONDS = 5.0
 _ASK_AGAIN_SECONDS = 0.5
@@ -276,10 +276,7 @@ class Connection:
         if why:
             return why
         if self.in_lockstep:
-            return (
-                "in lockstep it stands still between calls of step(), whose observations have the "
-                f"samples, as in sim.step(20).latest(robot.lrf); it is at {self.clock.utime * 1e-6:.2f} s"
-            )
+            return "in lockstep, sim time advances only in step(), whose observations have the samples, as in sim.step(20).latest(robot.lrf); it is at {self.clock.utime * 1e-6:.2f} s"
         return (
             f"its rate is {rate:g} Hz of sim time, which is now {self.clock.utime * 1e-6:.2f} s"
             if rate
@@ -426,8 +423,7 @@ class Connection:
 
     def _tell_another_server(self, run_id: int) -> None:
         log.warning(
-            "another server is at %s, too, with run %d; this client is in run %d, world %s. Samples of "
-            "both mix, and commands go to both: give one of them another --lcm port (this is said once)",
+            "another server is at %s, too, with run %d; this client is in run %d, world %s. Their samples mix, and commands reach both: start one of them with another --lcm port (shown once)",
             self.url,
             run_id,
             self.info.run_id,

@@ -6,15 +6,13 @@ import random
 import struct
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from .. import lcmtypes
 from ..decoding import decode
 from ..errors import NotSupported, RequestError, RunEnded, Timeout, TypeMismatch, for_terminal
 from ..samples import REPLIES, State
-
-if TYPE_CHECKING:
-    from .connection import Connection
+from .link import Link
 
 REQUEST_CHANNEL = "ruedo/request"
 _REPEAT_SECONDS = 0.1
@@ -35,10 +33,19 @@ _KINDS = _names(lcmtypes.request_t)
 _CODES = _names(lcmtypes.reply_t)
 
 
+class _TakesReplies(Protocol):
+    def on_reply(self, reply: Any) -> None: ...
+
+
+class _Link(Link, Protocol):
+    @property
+    def stepper(self) -> _TakesReplies: ...
+
+
 class Session:
     """A client's session with the server: joins on the first request."""
 
-    def __init__(self, connection: Connection, name: str):
+    def __init__(self, connection: _Link, name: str):
         self._connection = connection
         self._name = name
         self.name = name.encode()
@@ -207,7 +214,7 @@ def reply_of(reply: Any, type: str) -> Any:
     try:
         return convert(decode(message_type, reply.body))
     except Exception:
-        raise TypeMismatch(f"the reply's body is no {type} of this client's version") from None
+        raise TypeMismatch(f"the reply's body is not a {type} of this client's version") from None
 
 
 def state_of(reply: Any) -> State:

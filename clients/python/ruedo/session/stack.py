@@ -7,7 +7,6 @@ import sys
 import threading
 from types import FrameType
 
-
 _PACKAGE = __name__.partition(".")[0]
 
 

@@ -32,7 +32,7 @@ class Address:
 
 
 def read_address(url: str) -> Address:
-    """As the server reads it. Raises NoServer for a text that is no address of a client's."""
+    """As the server reads it. Raises NoServer for a text that is not an address."""
     try:
         return _address(url)
     except ValueError as error:
@@ -48,7 +48,7 @@ def _address(url: str) -> Address:
         raise ValueError("it has no scheme")
     if scheme == "unix":
         if not rest.startswith("/"):
-            raise ValueError(f"'{rest}' is no absolute path")
+            raise ValueError(f"'{rest}' is not an absolute path")
         return Address(scheme, path=rest)
     if scheme not in _DEFAULTS:
         raise ValueError("the schemes udpm, tcpq and unix are supported")
@@ -63,12 +63,12 @@ def _address(url: str) -> Address:
     default_host, default_port = _DEFAULTS[scheme]
     port = _number(digits, 1, 65535) if colon else default_port
     if port is None:
-        raise ValueError(f"'{digits}' is no port")
+        raise ValueError(f"'{digits}' is not a port")
     if scheme == "tcpq":
         return Address(scheme, _resolved(host or default_host), port)
     group = host or default_host
     if not _is_group(group):
-        raise ValueError(f"'{group}' is no multicast group (224.0.0.0 to 239.255.255.255)")
+        raise ValueError(f"'{group}' is not a multicast group (224.0.0.0 to 239.255.255.255)")
     ttl, receive_buffer = _options(options)
     return Address(scheme, group, port, ttl=ttl, receive_buffer=receive_buffer)
 
@@ -84,7 +84,7 @@ def _resolved(host: str) -> str:
     try:
         return socket.gethostbyname(host)
     except (OSError, UnicodeError):
-        raise ValueError(f"'{host}' is no host that this machine knows") from None
+        raise ValueError(f"'{host}' is not a host that this machine knows") from None
 
 
 def _is_group(text: str) -> bool:

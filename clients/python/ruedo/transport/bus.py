@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 
-from . import arrivals
 from ..callbacks import Callbacks, Subscription
 from ..errors import RuedoError
+from . import arrivals
 from .transport import Transport
 
 Handler = Callable[[bytes], None]

@@ -17,9 +17,9 @@ import threading
 import time
 from dataclasses import dataclass, field
 
+from ..errors import NoServer
 from . import arrivals
 from .address import Address
-from ..errors import NoServer
 from .stream import Receiver, is_readable
 
 _SHORT, _FRAGMENT = b"LC02", b"LC03"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from .address import has_multicast_route, read_address
 from ..errors import NoServer
+from .address import has_multicast_route, read_address
 from .multicast import MulticastTransport
 from .stream import Receiver, StreamTransport, is_served
 
@@ -50,7 +50,7 @@ def open_transport(url: str) -> Transport:
         if not has_multicast_route(address.host):
             raise NoServer(
                 f"{url}: this machine has no route for multicast. On Linux: "
-                "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more"
+                "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` explains"
             )
         return MulticastTransport(address)
     try:

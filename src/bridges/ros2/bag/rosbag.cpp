@@ -15,7 +15,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/world_info_t.hpp"
 #include "system/output_file.h"
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 namespace ruedo::ros2 {
 namespace {

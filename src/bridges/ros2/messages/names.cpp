@@ -34,7 +34,7 @@ TfLayout parse_tf_layout(const std::string& text) {
   if (text == "prefixed") return TfLayout::prefixed;
   if (text == "namespaced") return TfLayout::namespaced;
   if (text == "both") return TfLayout::both;
-  throw InputError({}, "'" + text + "' is none of prefixed, namespaced, both");
+  throw InputError({}, "'" + text + "' is not one of prefixed, namespaced, both");
 }
 
 std::string ros_name(const std::string& name) {

@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "base/xml.h"
 #include "bridges/ros2/messages/robot_frames.h"
 #include "ruedo/math.h"
-#include "world/read/xml_text.h"
 
 namespace ruedo::ros2 {
 namespace {
@@ -76,14 +76,14 @@ std::vector<Piece> pieces_of(const Geometry& geometry) {
   }
   std::error_code error;
   if (!geometry.mesh || !std::filesystem::is_regular_file(geometry.mesh->name, error)) return {};
-  return {{Pose{}, "<mesh filename=\"" + world::escaped(file_uri(geometry.mesh->name)) +
+  return {{Pose{}, "<mesh filename=\"" + xml_escaped(file_uri(geometry.mesh->name)) +
                        "\" scale=\"" + numbers(geometry.scale) + "\"/>"}};
 }
 
 // XML comments cannot contain two consecutive hyphens.
 std::string left_out(const char* element, const std::string& name) {
   std::string safe;
-  for (const char c : world::escaped(name)) safe += c == '-' ? '_' : c;
+  for (const char c : xml_escaped(name)) safe += c == '-' ? '_' : c;
   return fmt::format("    <!-- {} {}: URDF has no such shape -->\n", element, safe);
 }
 
@@ -94,7 +94,7 @@ std::string colour(const world::Visual& visual, const std::string& name) {
       visual.material ? visual.material->diffuse : world::Rgba{0.7f, 0.7f, 0.7f, 1.0f};
   return fmt::format(
       "<material name=\"{}\"><color rgba=\"{:.4g} {:.4g} {:.4g} {:.4g}\"/></material>",
-      world::escaped(name), rgba[0], rgba[1], rgba[2], rgba[3] * (1.0 - visual.transparency));
+      xml_escaped(name), rgba[0], rgba[1], rgba[2], rgba[3] * (1.0 - visual.transparency));
 }
 
 std::string inertial(const world::Inertial& inertial, const Pose& X_FL) {
@@ -107,8 +107,8 @@ std::string inertial(const world::Inertial& inertial, const Pose& X_FL) {
 }
 
 std::string link_text(const LinkFrame& frame, const world::Model& model) {
-  std::string text = "  <link name=\"" + world::escaped(frame.name) + "\">\n";
-  if (!frame.link.valid()) return "  <link name=\"" + world::escaped(frame.name) + "\"/>\n";
+  std::string text = "  <link name=\"" + xml_escaped(frame.name) + "\">\n";
+  if (!frame.link.valid()) return "  <link name=\"" + xml_escaped(frame.name) + "\"/>\n";
   const world::Link& link = model.links[frame.link];
   const Pose X_FL = frame.X_MF.inverse() * link.X_ML;
   text += inertial(link.inertial, X_FL);
@@ -150,13 +150,13 @@ std::string moving_joint(const LinkFrame& frame, const world::Model& model) {
                      : endless                       ? "continuous"
                                                      : "revolute";
   std::string text = fmt::format("  <joint name=\"{}\" type=\"{}\">\n    {}",
-                                 world::escaped(joint.name), type, origin(frame.X_PF));
+                                 xml_escaped(joint.name), type, origin(frame.X_PF));
   if (frame.motion == Motion::screw) return text;
   text += "<axis xyz=\"" + numbers(frame.axis) + "\"/>" +
           limits(joint.axis, frame.motion == Motion::slide || !endless);
   if (joint.leader.valid()) {
     text += fmt::format("<mimic joint=\"{}\" multiplier=\"{:.9g}\" offset=\"{:.9g}\"/>",
-                        world::escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
+                        xml_escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
                         joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference);
   }
   return text;
@@ -168,18 +168,16 @@ std::string joint_text(const LinkFrame& frame, const RobotFrames& robot,
       frame.joint.valid() ? model.joints[frame.joint].name : frame.name + "_to_base_link";
   std::string text = frame.motion == Motion::none
                          ? fmt::format("  <joint name=\"{}\" type=\"fixed\">\n    {}",
-                                       world::escaped(tied), origin(frame.X_PF))
+                                       xml_escaped(tied), origin(frame.X_PF))
                          : moving_joint(frame, model);
   return text + fmt::format("\n    <parent link=\"{}\"/><child link=\"{}\"/>\n  </joint>\n",
-                            world::escaped(robot.frames[frame.parent].name),
-                            world::escaped(frame.name));
+                            xml_escaped(robot.frames[frame.parent].name), xml_escaped(frame.name));
 }
 
 }  // namespace
 
 std::string urdf_of(const world::Model& model, const RobotFrames& robot) {
-  std::string text =
-      "<?xml version=\"1.0\"?>\n<robot name=\"" + world::escaped(model.name) + "\">\n";
+  std::string text = "<?xml version=\"1.0\"?>\n<robot name=\"" + xml_escaped(model.name) + "\">\n";
   for (const LinkFrame& frame : robot.frames) text += link_text(frame, model);
   for (size_t i = 1; i < robot.frames.size(); ++i)
     text += joint_text(robot.frames[i], robot, model);

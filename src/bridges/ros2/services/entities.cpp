@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "world/model/body_layout.h"
-#include "world/read/geometry.h"
+#include "world/model/bounds.h"
 
 namespace ruedo::ros2 {
 namespace {
@@ -131,7 +131,7 @@ void EntityFilter::take_expression(const std::string& text) {
   }
   compiled_ = text.find('\0') == std::string::npos &&
               regcomp(&expression_, text.c_str(), REG_EXTENDED | REG_NOSUB) == 0;
-  if (!compiled_) fault_ = {kFailed, "the filter is no POSIX extended regular expression"};
+  if (!compiled_) fault_ = {kFailed, "the filter is not a POSIX extended regular expression"};
 }
 
 void EntityFilter::take_bounds(uint8_t type, const std::vector<Vec3>& points) {

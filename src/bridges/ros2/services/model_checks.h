@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "bridges/ros2/services/results.h"
-#include "world/read/load_budget.h"
+#include "world/document/load_budget.h"
 
 namespace ruedo::ros2 {
 

@@ -186,7 +186,7 @@ Parameters::Parameter Parameters::read(CdrReader& in) {
 void Parameters::get_values(const CallPointer& call) {
   const std::vector<std::string> names = call->in.get_texts();
   if (!call->in.good() || names.size() > kMostNames) return void(++faulty_);
-  requests_.ask(
+  requests_.send(
       call->client(), request_t::GET_STATE, no_name(), [this, call, names](const reply_t& reply) {
         state_reply_t state{};
         const bool known =
@@ -311,7 +311,7 @@ void Parameters::apply(uint64_t client, const Parameter& parameter,
   if (const std::string fault = fault_of(parameter); !fault.empty()) return then(fault);
   if (parameter.name == "fault") return then(inject_fault(std::get<std::string>(parameter.value)));
   const auto ask = [&](int32_t kind, std::vector<uint8_t> body) {
-    requests_.ask(client, kind, std::move(body), [then](const reply_t& reply) {
+    requests_.send(client, kind, std::move(body), [then](const reply_t& reply) {
       then(reply.code == reply_t::OK ? "" : reply.text.empty() ? "it is refused" : reply.text);
     });
   };

@@ -49,7 +49,7 @@ void Requests::listen(const std::string& channel) {
   channel_ = channel;
 }
 
-void Requests::ask(uint64_t client, int32_t kind, std::vector<uint8_t> body, Then then) {
+void Requests::send(uint64_t client, int32_t kind, std::vector<uint8_t> body, Then then) {
   const char* too_many = nullptr;
   {
     const std::lock_guard lock(mutex_);
@@ -65,7 +65,7 @@ void Requests::ask(uint64_t client, int32_t kind, std::vector<uint8_t> body, The
     }
   }
   then(too_many ? refusal(reply_t::REFUSED, too_many)
-                : refusal(reply_t::NOT_SUPPORTED, "this run takes no requests (--control off)"));
+                : refusal(reply_t::NOT_SUPPORTED, "this run accepts no requests (--control off)"));
 }
 
 void Requests::join() {

@@ -39,7 +39,7 @@ class Requests {
 
   // Any thread. client: who asks. `then` is called once, in this thread (when nothing can be asked)
   // or in that of reply().
-  void ask(uint64_t client, int32_t kind, std::vector<uint8_t> body, Then then);
+  void send(uint64_t client, int32_t kind, std::vector<uint8_t> body, Then then);
 
   // A message on ruedo/reply.
   void reply(std::span<const uint8_t> message);

@@ -75,10 +75,10 @@ ServiceServer::ServiceServer(const ServiceContext& context, const std::string& n
       {Role::reply, {topic_.name, type + "_Response", kServiceQos}, hash, id});
   requests_ = context.transport.add_reader(
       {Role::request, {topic_.name, type + "_Request", kServiceQos}, hash, id, replies_.get()},
-      [this](const Sample& sample) { receive(sample); });
+      [this](const Sample& sample) { on_request(sample); });
 }
 
-void ServiceServer::receive(const Sample& sample) {
+void ServiceServer::on_request(const Sample& sample) {
   const auto call = std::make_shared<Call>(*replies_, sample, mapping_, topic_.type);
   if (!call->in.good()) {
     ++faulty_;

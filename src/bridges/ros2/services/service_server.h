@@ -77,14 +77,14 @@ class ServiceServer {
   const Writer& replies() const { return *replies_; }
 
  private:
-  void receive(const Sample& sample);
+  void on_request(const Sample& sample);
 
   Topic topic_;
   ServiceMapping mapping_;
   Handler handler_;
   std::atomic<uint64_t>& faulty_;
   std::unique_ptr<Writer> replies_;
-  std::unique_ptr<Reader> requests_;  // the last: it calls receive()
+  std::unique_ptr<Reader> requests_;  // the last: it calls on_request()
 };
 
 }  // namespace ruedo::ros2

@@ -195,11 +195,11 @@ void Services::send(const CallPointer& call, const CdrWriter& out) const {
 void Services::in_turn(uint64_t client, std::vector<Step> steps, Requests::Then then) {
   Step first = std::move(steps.front());
   steps.erase(steps.begin());
-  requests_.ask(client, first.kind, std::move(first.body),
-                [this, client, steps = std::move(steps), then](const reply_t& reply) {
-                  if (reply.code != reply_t::OK || steps.empty()) return then(reply);
-                  in_turn(client, steps, then);
-                });
+  requests_.send(client, first.kind, std::move(first.body),
+                 [this, client, steps = std::move(steps), then](const reply_t& reply) {
+                   if (reply.code != reply_t::OK || steps.empty()) return then(reply);
+                   in_turn(client, steps, then);
+                 });
 }
 
 void Services::in_turn(const CallPointer& call, std::vector<Step> steps) {
@@ -211,7 +211,7 @@ void Services::ask_state(uint64_t client, const std::string& name,
                          std::function<void(const Result&, const state_reply_t&)> then) {
   name_request_t body;
   body.name = name;
-  requests_.ask(client, request_t::GET_STATE, encoded(body), [then](const reply_t& reply) {
+  requests_.send(client, request_t::GET_STATE, encoded(body), [then](const reply_t& reply) {
     state_reply_t state{};
     Result result = result_of(reply);
     if (reply.code == reply_t::OK &&

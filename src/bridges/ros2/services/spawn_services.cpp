@@ -136,7 +136,7 @@ Result Services::fault_of(const Order& order) const {
       !fault.empty())
     return {kNameInvalid, "the name " + fault};
   if (!order.name_space.empty() && !is_namespace(order.name_space))
-    return {kNamespaceInvalid, "'" + order.name_space + "' is no namespace of ROS"};
+    return {kNamespaceInvalid, "'" + order.name_space + "' is not a namespace of ROS"};
   if (const std::string fault = engine::fault_of_pose(body.position, body.orientation);
       !fault.empty())
     return {kInvalidPose, fault};
@@ -152,7 +152,8 @@ void Services::spawn(uint64_t client, Order order, Spawned then) {
   std::string file;
   {
     const std::lock_guard lock(mutex_);
-    if (served_ == 0) return then({kUnsupported, "this run takes no requests (--control off)"}, "");
+    if (served_ == 0)
+      return then({kUnsupported, "this run accepts no requests (--control off)"}, "");
     if (entities_.world()) file = entities_.world()->file;
   }
   std::string uri = order.body.model, text = order.body.text;
@@ -183,7 +184,7 @@ void Services::spawn_checked(uint64_t client, Order order, const Spawned& then) 
     const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
     std::copy_n(wxyz, 4, body.orientation);
     body.on_ground = false;
-    requests_.ask(client, request_t::SPAWN, encoded(body), [done](const reply_t& reply) {
+    requests_.send(client, request_t::SPAWN, encoded(body), [done](const reply_t& reply) {
       state_reply_t state{};
       if (reply.code == reply_t::OK) decode_checked(reply.body.data(), reply.body.size(), state);
       done(result_of(reply), state.name);

@@ -119,8 +119,8 @@ void StepAction::step() {
     if (goal->status == canceling) return end(*goal, canceled, kOk, "");
     if (goal->done == goal->steps) return end(*goal, succeeded, kOk, "");
   }
-  requests_.ask(kNode, request_t::STEP, engine::encoded(body),
-                [this](const reply_t& reply) { stepped(reply); });
+  requests_.send(kNode, request_t::STEP, engine::encoded(body),
+                 [this](const reply_t& reply) { stepped(reply); });
 }
 
 void StepAction::stepped(const reply_t& reply) {

@@ -1,6 +1,6 @@
 // Applies the draws to a copy of the world: settings first, then masses, friction and lights, then
 // positions, of the models in world order.
-#include "world/edit/randomization.h"
+#include "world/randomization.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,8 @@
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
 #include "ruedo/random.h"
+#include "world/drives/placement.h"
 #include "world/load.h"
-#include "world/model/placement.h"
 #include "world/settings.h"
 
 namespace ruedo::world {

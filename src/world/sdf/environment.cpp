@@ -1,5 +1,5 @@
 // <spherical_coordinates>, <atmosphere>, <wind> and <magnetic_field>.
-#include "world/model/environment.h"
+#include "world/sdf/environment.h"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // Searches for files in a fixed order: around the naming file, around the top file, Ruedo's own
 // worlds, then the environment variables of Ruedo and Gazebo.
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 #include <algorithm>
 #include <cctype>
@@ -9,8 +9,8 @@
 
 #include "base/input_file.h"
 #include "system/installation.h"
-#include "world/read/document.h"
-#include "world/read/sdf_version.h"
+#include "world/document/document.h"
+#include "world/document/sdf_version.h"
 
 namespace fs = std::filesystem;
 

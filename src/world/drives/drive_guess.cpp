@@ -1,12 +1,12 @@
 // Wheels are continuous joints with a level axis whose link touches the ground. Links with "wheel"
 // in their name come first; without any, round links that come in pairs.
-#include "world/model/drive_guess.h"
+#include "world/drives/drive_guess.h"
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
-#include "world/read/geometry.h"
+#include "world/model/bounds.h"
 
 namespace ruedo::world {
 namespace {

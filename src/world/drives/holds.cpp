@@ -1,5 +1,5 @@
 // Parameter names follow the plugin's documentation.
-#include "world/model/holds.h"
+#include "world/drives/holds.h"
 
 #include <algorithm>
 
@@ -38,7 +38,7 @@ Hold read_hold(const Element& plugin, const Model& model) {
   const auto link = std::find_if(model.links.begin(), model.links.end(),
                                  [&](const Link& each) { return each.name == parent; });
   if (link == model.links.end())
-    plugin.fail("DetachableJoint: <parent_link> '" + parent + "' is no link of the model");
+    plugin.fail("DetachableJoint: <parent_link> '" + parent + "' is not a link of the model");
   hold.link = ModelLinkIndex(link - model.links.begin());
   hold.other_model = dotted(required(plugin, "child_model"));
   hold.other_link = dotted(required(plugin, "child_link"));

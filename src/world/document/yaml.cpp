@@ -1,5 +1,5 @@
 // Converts yaml-cpp's nodes to elements.
-#include "world/read/yaml.h"
+#include "world/document/yaml.h"
 
 #include <algorithm>
 #include <map>
@@ -97,7 +97,7 @@ std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& 
     Converter{file}.convert(node, *root, 0);
   } catch (const YAML::Exception& error) {
     throw InputError({file, error.mark.is_null() ? 0 : error.mark.line + 1},
-                     "is no YAML: " + error.msg);
+                     "is not YAML: " + error.msg);
   }
   return root;
 }

@@ -1,8 +1,8 @@
-#include "world/edit/saved_state.h"
+#include "world/sdf/saved_state.h"
 
 #include <algorithm>
 
-#include "world/model/joint_start.h"
+#include "world/drives/joint_start.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {

@@ -1,6 +1,6 @@
 // <ruedo:drive> and <ruedo:odometry>. What they leave out is derived from the wheels' joints and
 // shapes.
-#include "world/model/drive.h"
+#include "world/drives/drive.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,13 +14,12 @@
 #include "world/compat/plugins.h"
 #include "world/compat/ros_control.h"
 #include "world/compat/ros_gains.h"
-#include "world/model/drive_guess.h"
-#include "world/model/holds.h"
-#include "world/model/lifts.h"
-#include "world/model/odd_drive.h"
+#include "world/drives/drive_guess.h"
+#include "world/drives/holds.h"
+#include "world/drives/lifts.h"
+#include "world/drives/odd_drive.h"
+#include "world/model/bounds.h"
 #include "world/model/own_plugins.h"
-#include "world/read/geometry.h"
-#include "world/sdf/sdf_link.h"
 
 namespace ruedo::world {
 namespace {

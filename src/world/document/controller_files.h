@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "ruedo/element.h"
-#include "world/read/resources.h"
+#include "world/document/resources.h"
 
 namespace ruedo::world {
 

@@ -1,10 +1,11 @@
-#include "world/model/odd_drive.h"
+#include "world/drives/odd_drive.h"
 
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
 
-#include "world/model/drive.h"
+#include "base/text.h"
+#include "world/drives/drive.h"
 
 namespace ruedo::world {
 namespace {

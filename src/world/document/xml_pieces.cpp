@@ -1,5 +1,5 @@
 // tinyxml2's own order: declarations, comments, CDATA, what else begins with "<!", tags, text.
-#include "world/read/xml_pieces.h"
+#include "world/document/xml_pieces.h"
 
 #include <algorithm>
 

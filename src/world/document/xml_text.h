@@ -47,7 +47,4 @@ class TextPatch {
   std::vector<Change> changes_;
 };
 
-// Escapes text for use between tags and in quotes.
-std::string escaped(std::string_view text);
-
 }  // namespace ruedo::world

@@ -209,7 +209,7 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
     throw std::runtime_error("the picture is broken");
   }
   if (grey.empty())
-    throw std::runtime_error("it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+    throw std::runtime_error("it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)");
   if (grey.depth() == CV_16S || grey.depth() == CV_32F || grey.depth() == CV_64F)
     grey = normalized(grey);
   else if (grey.depth() != CV_8U && grey.depth() != CV_16U)

@@ -1,11 +1,11 @@
 // The folders of packages where controllers' parameters lie by custom.
-#include "world/read/controller_files.h"
+#include "world/document/controller_files.h"
 
 #include <algorithm>
 #include <filesystem>
 
 #include "base/input_file.h"
-#include "world/read/yaml.h"
+#include "world/document/yaml.h"
 
 namespace fs = std::filesystem;
 

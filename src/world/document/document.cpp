@@ -1,5 +1,5 @@
 // Reads files into element trees, with tinyxml2.
-#include "world/read/document.h"
+#include "world/document/document.h"
 
 #include <algorithm>
 #include <set>
@@ -8,7 +8,8 @@
 #include <tinyxml2.h>
 
 #include "base/input_file.h"
-#include "world/read/xml_pieces.h"
+#include "base/text.h"
+#include "world/document/xml_pieces.h"
 
 namespace ruedo::world {
 namespace {
@@ -18,13 +19,6 @@ constexpr size_t kMaxFileBytes = 64u << 20;
 // counted before it runs.
 constexpr size_t kMaxElements = 2'000'000, kMaxAttributes = 64, kMaxDepth = 200,
                  kMaxAttributeBytes = 64 << 10, kMaxTextBytes = 1 << 20;
-
-std::string trimmed(const std::string& text) {
-  const char* space = " \t\r\n\f\v";
-  const size_t begin = text.find_first_not_of(space);
-  return begin == std::string::npos ? ""
-                                    : text.substr(begin, text.find_last_not_of(space) - begin + 1);
-}
 
 // Whether the bytes are UTF-8 (overlong forms and surrogates are let through: nothing here
 // interprets them).

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "world/mesh/mesh.h"
+#include "world/model/mesh.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {

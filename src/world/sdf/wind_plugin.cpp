@@ -1,8 +1,8 @@
 // The plugins WindEffects of gz-sim and WindPlugin of Gazebo Classic, which share their elements.
 #include <cmath>
 
-#include "world/model/environment.h"
 #include "world/read/read_context.h"
+#include "world/sdf/environment.h"
 
 namespace ruedo::world {
 namespace {

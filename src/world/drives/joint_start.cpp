@@ -1,9 +1,10 @@
-#include "world/model/joint_start.h"
+#include "world/drives/joint_start.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "base/text.h"
 #include "ruedo/math.h"
 #include "world/read/read_context.h"
 

@@ -6,9 +6,10 @@
 #include <cmath>
 #include <string_view>
 
+#include "base/text.h"
 #include "world/compat/plugins.h"
-#include "world/model/drive.h"
-#include "world/model/drive_guess.h"
+#include "world/drives/drive.h"
+#include "world/drives/drive_guess.h"
 
 namespace ruedo::world {
 namespace {

@@ -1,10 +1,10 @@
 // A single pass over the text, tag by tag.
-#include "world/read/xml_text.h"
+#include "world/document/xml_text.h"
 
 #include <algorithm>
 
 #include "ruedo/errors.h"
-#include "world/read/xml_pieces.h"
+#include "world/document/xml_pieces.h"
 
 namespace ruedo::world {
 namespace {
@@ -79,21 +79,6 @@ std::string TextPatch::applied_to(std::string_view text) const {
     at = change->end;
   }
   return result += text.substr(at);
-}
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      case '\'': result += "&apos;"; break;
-      default: result += c;
-    }
-  }
-  return result;
 }
 
 }  // namespace ruedo::world

@@ -1,5 +1,5 @@
 // Parameter names and defaults follow the plugins' documentation.
-#include "world/model/lifts.h"
+#include "world/drives/lifts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,7 +35,7 @@ struct Reader {
 
   ModelJointIndex joint(const std::string& name) const {
     const ModelJointIndex found = find_joint(model, name);
-    if (!found.valid()) plugin.fail("the joint '" + name + "' is none of the model's joints");
+    if (!found.valid()) plugin.fail("the joint '" + name + "' is not one of the model's joints");
     return found;
   }
 

@@ -1,6 +1,6 @@
 // Heights from vertical lines through static collisions; free space by GJK against nearby
 // collisions.
-#include "world/model/placement.h"
+#include "world/drives/placement.h"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,11 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/text.h"
 #include "base/whole.h"
 #include "ruedo/math.h"
+#include "world/model/bounds.h"
 #include "world/model/convex.h"
-#include "world/read/geometry.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {

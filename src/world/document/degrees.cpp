@@ -1,5 +1,5 @@
 // A walk over the document as written.
-#include "world/read/degrees.h"
+#include "world/document/degrees.h"
 
 #include <algorithm>
 #include <charconv>

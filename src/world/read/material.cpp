@@ -1,5 +1,5 @@
 // <material>, Gazebo's colour table, and a reader for simple OGRE material scripts.
-#include "world/mesh/material.h"
+#include "world/read/material.h"
 
 #include <algorithm>
 #include <charconv>
