@@ -1,0 +1,58 @@
+"""Texts for users keep to plain words: `scripts/texts.py` collects them.
+
+The phrases below, which readers misunderstood, do not come back.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import texts
+
+RIDDLES = {
+    r"(?<!there )(?<!There )\b(?:is|are) no (?!longer|more|less|way|need|doubt)": "is not a ...",
+    r"this is said once": "shown once",
+    r"\bheld up\b": "did not run",
+    r"\bgoes? not\b": "cannot be used with",
+    r"\bthat is no\b": "does not decode as, is not a",
+    r"\bcan be taken over\b": "restore",
+    r"\bwants (?:a|an|the|finite)\b": "needs",
+    r"\bis none of\b": "is not one of",
+    r"\btells more\b": "explains",
+}
+
+
+@pytest.fixture(scope="module")
+def every_text():
+    return list(texts.texts())
+
+
+@pytest.mark.parametrize("riddle", RIDDLES)
+def test_no_text_is_a_riddle(every_text, riddle):
+    found = [
+        f"{file}:{line}: {text[:200]}" for file, line, text in every_text if re.search(riddle, text)
+    ]
+    assert not found, f"say {RIDDLES[riddle]!r}:\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "name, source, expected",
+    [
+        ("a.cpp", 'fail("the wheel is " // why\n     "not there");', "the wheel is not there"),
+        ("a.cpp", '// "a comment is not one"\nint x;', None),
+        ("a.cpp", 'f("http://one is a text", 1);', "http://one is a text"),
+        ("a.java", 'say("no robot of " + "that name");', "no robot of that name"),
+        ("a.py", 'f"no robot {name} is there"', "no robot {} is there"),
+        ("a.py", '"""Turns the robot round."""', "Turns the robot round."),
+        ("a.ts", "say(`no robot ${name} here`);", "no robot ${name} here"),
+    ],
+)
+def test_texts_are_found(tmp_path, name, source, expected):
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / name).write_text(source)
+    assert [text for _, _, text in texts.texts(tmp_path)] == ([expected] if expected else [])
