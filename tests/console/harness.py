@@ -170,12 +170,12 @@ class Socket:
 
 @contextmanager
 def browser(url, folder, scenario, given=None):
-    """The browser as it goes through a scenario (browser.mjs)."""
+    """The browser as it goes through a scenario (scenarios/browser.mjs)."""
     if MISSING:
         pytest.fail(
             f"{' and '.join(MISSING)} missing: scripts/test installs what is needed", pytrace=False
         )
-    command = [NODE, SOURCE / "tests/console/browser.mjs", url, folder, scenario] + (
+    command = [NODE, SOURCE / "tests/console/scenarios/browser.mjs", url, folder, scenario] + (
         [json.dumps(given)] if given else []
     )
     process = subprocess.Popen(
