@@ -1,6 +1,7 @@
 // A viewer gets what the simulation's cameras draw: the same tessellation, surfaces and lights.
 #include "console/scene_data.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <limits>
@@ -250,6 +251,28 @@ void write_joints(JsonWriter& out, const world::WorldModel& world,
   out.close(']');
 }
 
+// The classes of gz-sim's plugin Label: each with the models that have it, in the order in which
+// segmentation cameras number them.
+void write_classes(JsonWriter& out, const world::WorldModel& world,
+                   const world::BodyLayout& layout) {
+  std::map<int, std::vector<InstanceIndex>> classes;
+  for (const world::LinkPlacement& link : layout.links) {
+    for (const world::Visual& visual : world.models[link.instance].model->links[link.link].visuals) {
+      std::vector<InstanceIndex>& known = classes[visual.label];
+      if (visual.label > 0 && std::find(known.begin(), known.end(), link.instance) == known.end())
+        known.push_back(link.instance);
+    }
+  }
+  classes.erase(0);
+  out.name("classes").open('[');
+  for (const auto& [label, instances] : classes) {
+    out.open('[').value(label);
+    for (const InstanceIndex instance : instances) out.value(world.models[instance].name);
+    out.close(']');
+  }
+  out.close(']');
+}
+
 http::Bytes link_bytes(const world::WorldModel& world, const world::BodyLayout& layout,
                        const scene::RenderContent& content) {
   Blob blob;
@@ -300,6 +323,7 @@ SceneData::SceneData(const world::WorldModel& world, int version) {
   write_wheels(out, layout);
   write_bases(out, world, layout);
   write_joints(out, world, layout);
+  write_classes(out, world, layout);
   out.close('}');
   json = http::bytes_of(out.text());
   links = link_bytes(world, layout, content);

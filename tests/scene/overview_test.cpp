@@ -81,6 +81,25 @@ TEST(Overview, TheFloorIsWhatRobotsStandOn) {
   EXPECT_FALSE(overview_of(walls(0.0)).ceiling) << "it is open";
 }
 
+// As gz-sim's contact_sensor.sdf: a ball that falls from 3 m over the ground covers all of itself.
+TEST(Overview, WhatMovesIsNoRoof) {
+  const std::string ground =
+      "<model name='g'><static>true</static><link name='l'><visual name='v'><geometry><plane>"
+      "<normal>0 0 1</normal><size>100 100</size></plane></geometry></visual></link></model>";
+  std::string ball = box("ball", "0 0 3", "1 1 1");
+  const std::string fixed = "<static>true</static>";
+  EXPECT_TRUE(overview_of(ground + ball).ceiling) << "a fixed one is";
+  ball.replace(ball.find(fixed), fixed.size(), "");
+  EXPECT_FALSE(overview_of(ground + ball).ceiling);
+  const auto open = without_what_is_above(
+      *world::load_world_text("<sdf version='1.9'><world name='w'>" + ball +
+                                  box("roof", "0 0 3", "9 9 0.1") + "</world></sdf>",
+                              "/nowhere/w.sdf"),
+      2.0);
+  EXPECT_EQ(open->models[0].model->links[0].visuals.size(), 1U);
+  EXPECT_EQ(open->models[1].model->links[0].visuals.size(), 0U);
+}
+
 TEST(Overview, AWorldWithoutAnythingHasOne) {
   const Overview seen = overview_of("");
   EXPECT_LT(seen.shown.low.x(), seen.shown.high.x());

@@ -1,4 +1,5 @@
-// Roofs are cut off by shapes and triangles: whatever reaches below the height is kept whole.
+// Roofs are cut off by shapes and triangles: whatever reaches below the height is kept whole, and
+// whatever can move: a body above the floor will fall.
 #include "scene/pictures/overview.h"
 
 #include <algorithm>
@@ -213,9 +214,10 @@ std::optional<double> ceiling_of(const world::WorldModel& world, const Box& show
   const double whole = shown.sizes().x() * shown.sizes().y();
   Area area;
   for_each_visual(world,
-                  [&](const world::ModelInstance&, const world::Visual& visual, const Pose& X_WV) {
+                  [&](const world::ModelInstance& instance, const world::Visual& visual,
+                      const Pose& X_WV) {
                     const Box box = placed(visual.geometry, X_WV);
-                    if (box.isEmpty() || !shown.intersects(box)) return;
+                    if (!instance.model->is_static || box.isEmpty() || !shown.intersects(box)) return;
                     const Area own = area_of(visual, X_WV, floor + kPerson_m);
                     area.above += own.above;
                     area.below += own.below;
@@ -240,6 +242,7 @@ std::shared_ptr<const world::WorldModel> without_what_is_above(const world::Worl
                                                                double height_m) {
   auto open = std::make_shared<world::WorldModel>(world);
   for (world::ModelInstance& instance : open->models) {
+    if (!instance.model->is_static) continue;
     auto own = std::make_shared<world::Model>(*instance.model);
     for (world::Link& link : own->links) cut(link, instance.X_WM * link.X_ML, height_m);
     instance.model = std::move(own);

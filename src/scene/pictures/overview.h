@@ -15,13 +15,13 @@ struct Overview {
   Bounds shown;
   double floor = 0.0;  // m, world: what robots stand on
   // m, world: things above it hide what is below; set where, seen from above, more than half of
-  // what is shown lies under visuals higher than a person. nullopt: it is open.
+  // what is shown lies under visuals of fixed models higher than a person. nullopt: it is open.
   std::optional<double> ceiling;
 };
 Overview overview(const world::WorldModel& world);
 
-// The same world without the visuals above that height: whole shapes, and single triangles of
-// meshes.
+// The same world without the visuals of fixed models above that height: whole shapes, and single
+// triangles of meshes.
 std::shared_ptr<const world::WorldModel> without_what_is_above(const world::WorldModel& world,
                                                                double height_m);
 

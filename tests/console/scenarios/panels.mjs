@@ -83,6 +83,22 @@ async function arrange({ page, until, check, picture }) {
   await page.keyboard.press("ArrowRight");
   check("and moved by keys", Math.abs((await width()) - before - 80) < 3, await width());
 
+  // The view takes the room of a window that grows, and gives it back.
+  const kept = await width();
+  for (const wide of [1900, 1100]) {
+    await page.setViewportSize({ width: wide, height: 600 });
+    await until("(it is arranged)", (w) => window.innerWidth === w, wide);
+    await page.waitForFunction(
+      (w) => document.getElementById("dock").clientWidth === w,
+      wide,
+    );
+    check(
+      `the panel keeps its width in a window of ${wide} pixels`,
+      Math.abs((await width()) - kept) < 3,
+      `${await width()} of ${kept}`,
+    );
+  }
+
   const view = await box("#view"),
     tab = (name) => page.getByRole("tab", { name });
   await tab("Plots").dragTo(page.locator("#canvas"), {
@@ -144,6 +160,7 @@ async function arrange({ page, until, check, picture }) {
     same.every((value, i) => Math.abs(value - place[i]) < 1e-6),
     JSON.stringify([same, place]),
   );
+  await picks({ page, until, check });
   await page.locator("#open-panels").click();
   await page.getByLabel("add a camera").selectOption("p3at/camera");
   await page.keyboard.press("Escape");
@@ -192,4 +209,60 @@ async function arrange({ page, until, check, picture }) {
     "one view is drawn then",
     (await page.evaluate(() => window.ruedo.stage.further.size)) === 0,
   );
+}
+
+// What is clicked in a further view is what is seen there, from where that view looks.
+async function picks({ page, until, check }) {
+  const onFurther = ([x, y, z]) =>
+    page.evaluate(
+      (place) => {
+        const [view] = window.ruedo.stage.further,
+          { left, top, width, height } = view.canvas.getBoundingClientRect(),
+          { camera } = view.view;
+        camera.updateMatrixWorld();
+        const at = camera.position.clone().set(...place).project(camera);
+        return [left + ((at.x + 1) / 2) * width, top + ((1 - at.y) / 2) * height];
+      },
+      [x, y, z],
+    );
+  const tool = (name) => page.evaluate((tool) => window.ruedo.page.set({ tool }), name);
+  // Of the robot's own place on the floor, 1 m aside
+  const [x, y] = await page.evaluate(() => [...window.ruedo.poses.now.slice(0, 2)]);
+  const there = [x + 1, y - 1, 0];
+  await page.waitForTimeout(500); // until its camera rests
+  const [px, py] = await onFurther(there);
+  await page.mouse.move(px, py);
+  await until(
+    "a further view has coordinates under the pointer",
+    ([x, y]) => {
+      const [a, b] = document.getElementById("coordinates").textContent.split(", ").map(parseFloat);
+      return Math.abs(a - x) < 0.05 && Math.abs(b - y) < 0.05;
+    },
+    there,
+  );
+  await tool("measure");
+  for (const to of [there, [x + 1, y + 1, 0]]) {
+    const [mx, my] = await onFurther(to);
+    await page.mouse.click(mx, my);
+  }
+  await until("a way is measured in a further view", () =>
+    /^(1\.9[5-9]|2\.0[0-5]) m/.test(document.getElementById("coordinates").textContent),
+  );
+  await tool("select");
+  await page.getByRole("tab", { name: "World" }).click();
+  const box = await page.evaluate(() => {
+    const { stage } = window.ruedo,
+      model = stage.bodies.description.models.find(({ name }) => name === "box_1"),
+      { min, max } = stage.bodies.boxOf(model);
+    return [(min.x + max.x) / 2, (min.y + max.y) / 2, max.z];
+  });
+  const [bx, by] = await onFurther(box);
+  await page.mouse.click(bx, by);
+  await until(
+    "a click there selects the model that is seen",
+    () => window.ruedo.page.now.selected === "box_1",
+  );
+  await page.evaluate(() => window.ruedo.page.set({ selected: "" }));
+  await page.getByRole("tab", { name: "Notes" }).click();
+  check("(picked)", true);
 }

@@ -1,11 +1,13 @@
 // The page as a whole: creates its parts and draws them. Each part knows only those created before
 // it.
-import { listenToClicks } from "../edit/clicks";
+import { Clicks } from "../edit/clicks";
 import { togglePanel, toggleTheme } from "../state/choices";
 import { Aim } from "../ui/aim";
 import { Bar } from "../ui/bar";
 import { Drive } from "../ui/drive";
 import { fillHelp } from "../ui/help";
+import type { FurtherView } from "../scene/further_view";
+import type { Stage } from "../scene/stage";
 import { listenToKeys } from "../ui/keys";
 import { makeLegend } from "../ui/legend";
 import { Notice } from "../ui/notice";
@@ -113,20 +115,24 @@ export class App {
 
   private listen(): void {
     const { model, scene, editing, panel, robot } = this;
-    const click = listenToClicks(
-      scene.canvas,
-      model.page,
-      scene.stage,
-      editing.editor,
-      panel.editPage.door,
-      () => editing.gizmo.seized,
-      (point) => scene.measure.click(point),
-      (point, further) => robot.trip.go(point, further),
-    );
+    const clicks = new Clicks(model.page, editing.editor, panel.editPage.door, {
+      isBusy: () => editing.gizmo.seized,
+      measured: (point) => scene.measure.click(point),
+      sent: (point, further) => robot.trip.go(point, further),
+    });
+    const point = (canvas: HTMLCanvasElement, { picker, view }: Stage | FurtherView) => {
+      scene.measure.listen(canvas, picker);
+      editing.draw.listen(canvas, picker, view.controls);
+      clicks.listen(canvas, picker);
+    };
+    point(scene.canvas, scene.stage);
+    scene.stage.onView = (view) => point(view.canvas, view);
+    const { picker } = scene.stage;
     new Aim(byId("view"), scene.canvas, model.page, {
       click: (x, y, further) =>
-        editing.draw.drawing ? editing.draw.click(x, y) : click(x, y, further),
-      look: (x, y) => (editing.draw.drawing ? editing.draw.look(x, y) : scene.measure.look(x, y)),
+        editing.draw.drawing ? editing.draw.click(x, y) : clicks.click(x, y, further, picker),
+      look: (x, y) =>
+        editing.draw.drawing ? editing.draw.look(x, y) : scene.measure.look(x, y, picker),
     });
     model.onForget((reset) => {
       if (reset) this.fallen.forget();

@@ -20,7 +20,7 @@ export class Arrangement {
     wanted.add(() => this.cameras.channels);
     this.dock = new Dock(byId("dock"), page, byId("view"), panel.all, (kind, settings) =>
       kind === "camera"
-        ? this.camera(model, String(settings.channel))
+        ? this.cameras.make(String(settings.channel))
         : makeScenePanel(page, scene.stage, settings),
     );
     new Layout(page, this.dock);
@@ -29,12 +29,5 @@ export class Arrangement {
       "click",
       () => void copyLink(model, scene.stage, panel.plots.kept, this.dock.kept),
     );
-  }
-
-  private camera({ page }: Model, channel: string) {
-    const { channels = [], devices = [] } = page.now.world ?? {},
-      { robot, device } = channels.find(({ name }) => name === channel) ?? {},
-      kind = devices.find((each) => each.robot === robot && each.name === device)?.kind;
-    return this.cameras.make(channel, kind ?? "");
   }
 }

@@ -18,7 +18,7 @@ export class Editing {
     this.editor = new Editor(page, model.poses, model.control, (of) => stage.bodies.boxOf(of));
     this.gizmo = new Gizmo(page, stage, this.editor, canvas);
     this.outline = new Outline(page, stage, this.editor);
-    this.draw = new Draw(page, stage, this.editor, canvas);
+    this.draw = new Draw(page, stage, this.editor);
     listenToEditing(page, this.editor);
     model.onForget((reset) => {
       if (reset) this.editor.history.clear();

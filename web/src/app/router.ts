@@ -3,6 +3,7 @@ import type { device_info_t, Messages } from "../../generated/messages";
 import { isCompared } from "../state/comparison";
 import type { Loading } from "../state/loading";
 import { intensitiesOf, pointsOfDepth, pointsOfLidar } from "../scene/clouds";
+import { pictureSource } from "../state/labels";
 import { isDepth } from "../state/wanted";
 import { channelOfType, type World } from "../state/world";
 import type { Clock } from "../state/clock";
@@ -16,6 +17,7 @@ import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
 import type { FieldPlots } from "../ui/field_plots";
 import type { RobotPages } from "../ui/robot";
+import type { Source } from "../widgets/picture";
 import { decode, fingerprint, typeOf, type TypeName } from "../wire/lcm";
 import type { Session } from "../wire/session";
 
@@ -46,7 +48,9 @@ export function routesOf(world: World): Map<string, Route> {
 }
 
 // What shows the pictures of single channels.
-type Cameras = readonly { message(channel: string, image: Messages["image_t"]): void }[];
+type Cameras = readonly {
+  message(channel: string, image: Messages["image_t"], source: Source): void;
+}[];
 
 const seconds = ({ utime }: { utime: bigint }) => Number(utime) * 1e-6;
 
@@ -59,6 +63,7 @@ interface Shown {
   pages: RobotPages | undefined; // for the chosen robot only
   stage: Stage;
   cameras: Cameras;
+  source: Source; // of pictures
 }
 // Messages are decoded only if a view shows them.
 type Show<Type extends TypeName> = (to: Shown, read: () => Messages[Type]) => void;
@@ -101,13 +106,13 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
   imu_t({ device, pages }, read) {
     if (device) pages?.imu(device, read());
   },
-  image_t({ channel, device, overlay, pages, cameras }, read) {
+  image_t({ channel, device, overlay, pages, cameras, source }, read) {
     const image = read();
     const points =
       device && isDepth(channel, "image_t") ? pointsOfDepth(image, device.fov_horizontal) : null;
     if (points) overlay?.cloud(device!, seconds(image), points, null);
-    for (const each of cameras) each.message(channel, image);
-    pages?.camera(channel.slice(channel.indexOf("/") + 1), image, device?.kind);
+    for (const each of cameras) each.message(channel, image, source);
+    pages?.camera(channel.slice(channel.indexOf("/") + 1), image, source);
   },
   lidar_t({ device, overlay }, read) {
     if (!device) return;
@@ -204,6 +209,7 @@ export class Router {
       pages: index === this.page.now.robot ? this.views.pages : undefined,
       stage: this.views.stage,
       cameras: this.views.cameras,
+      source: pictureSource(this.page.now, device),
     };
     const read = () => decode(type, bytes);
     const show: Show<Type> | undefined = kShow[type];

@@ -29,7 +29,7 @@ export class SceneView {
     this.markers = new Markers(page, this.stage);
     this.ghosts = new Ghosts(page, this.stage);
     this.labels = new Labels(byId("view"), page, this.stage);
-    this.measure = new Measure(page, this.stage, this.canvas);
+    this.measure = new Measure(page, this.stage);
     this.way = new Way(this.stage);
     if (!this.stage.renderer) byId("flat").hidden = false;
     this.stage.onDetail = (reduced) => page.set({ reduced });

@@ -1,7 +1,7 @@
 // Clicks on the scene: choose, select, send a robot, place a thing, or make a door.
 import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
-import type { Stage } from "../scene/stage";
+import type { Picker } from "../scene/picker";
 import type { Page } from "../state/page";
 import { toast } from "../widgets/elements";
 import type { Editor } from "./editor";
@@ -9,35 +9,41 @@ import type { Door } from "./sdf";
 
 const kClick_px = 5; // the pointer may move this far in a click
 
-// Returns what clicks at a point of the page; further: in addition to earlier points.
-export function listenToClicks(
-  canvas: HTMLElement,
-  page: Page,
-  stage: Stage,
-  editor: Editor,
-  door: Door,
-  busy: () => boolean,
-  measured: (point: THREE.Vector3) => void,
-  sent: (point: THREE.Vector3, further: boolean) => void,
-): (x: number, y: number, further: boolean) => void {
-  let down = { x: 0, y: 0 },
-    taken = false;
-  canvas.addEventListener("pointerdown", (event) => {
-    down = { x: event.clientX, y: event.clientY };
-    taken = busy();
-  });
-  canvas.addEventListener("pointerup", (event) => {
-    if (
-      event.button !== 0 ||
-      taken ||
-      Math.hypot(event.clientX - down.x, event.clientY - down.y) > kClick_px
-    )
-      return;
-    click(event.clientX, event.clientY, event.shiftKey);
-  });
-  const click = (x: number, y: number, further: boolean) => {
-    const { tool } = page.now,
-      picked = stage.picker.pick(x, y);
+export interface ClickActions {
+  isBusy(): boolean; // a click means nothing here
+  measured(point: THREE.Vector3): void;
+  sent(point: THREE.Vector3, further: boolean): void;
+}
+
+export class Clicks {
+  constructor(
+    private readonly page: Page,
+    private readonly editor: Editor,
+    private readonly door: Door,
+    private readonly actions: ClickActions,
+  ) {}
+
+  // To the clicks on a view's canvas.
+  listen(canvas: HTMLElement, picker: Picker): void {
+    let down = { x: 0, y: 0 },
+      taken = false;
+    canvas.addEventListener("pointerdown", (event) => {
+      down = { x: event.clientX, y: event.clientY };
+      taken = this.actions.isBusy();
+    });
+    canvas.addEventListener("pointerup", ({ button, clientX, clientY, shiftKey }) => {
+      const moved_px = Math.hypot(clientX - down.x, clientY - down.y);
+      if (button === 0 && !taken && moved_px <= kClick_px)
+        this.click(clientX, clientY, shiftKey, picker);
+    });
+  }
+
+  // At a point of the page; further: in addition to earlier points.
+  click(x: number, y: number, further: boolean, picker: Picker): void {
+    const { page, editor, door } = this,
+      { measured, sent } = this.actions,
+      { tool } = page.now,
+      picked = picker.pick(x, y);
     if (tool === "wall" || tool === "room") return;
     if (tool === "measure") {
       if (picked.point) measured(picked.point);
@@ -63,8 +69,7 @@ export function listenToClicks(
         ({ name }) => name === page.now.scene?.bases[picked.robot]?.robot,
       ) ?? -1;
     if (robot >= 0) page.set({ robot });
-  };
-  return click;
+  }
 }
 
 // A door takes the full thickness of its wall; only the position along the wall matters.

@@ -2,6 +2,7 @@
 // keys click), on the floor where they begin.
 import * as THREE from "three";
 import { kOnTop, putOnTop } from "../scene/on_top";
+import type { Picker } from "../scene/picker";
 import type { Stage } from "../scene/stage";
 import type { Page } from "../state/page";
 import type { Editor } from "./editor";
@@ -15,6 +16,7 @@ export class Draw {
   style: WallStyle = { height: 1.2, thickness: 0.1 };
   onLength: (words: string) => void = () => undefined; // the dimensions of what is being drawn
   private from: Point | null = null;
+  private picker: Picker; // of the view in which it was begun
   private to: Point = { x: 0, y: 0, z: 0 };
   private readonly ghost = new THREE.LineSegments(
     new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1)),
@@ -25,17 +27,21 @@ export class Draw {
     private readonly page: Page,
     private readonly stage: Stage,
     private readonly editor: Editor,
-    canvas: HTMLCanvasElement,
   ) {
+    this.picker = stage.picker;
     this.ghost.visible = false;
     putOnTop(this.ghost);
     stage.scene.add(this.ghost);
     page.watch(["tool"], () => {
       this.cancel();
-      stage.view.controls.enabled = !this.drawing;
     });
+  }
+
+  // Drags over that canvas draw; its camera rests meanwhile.
+  listen(canvas: HTMLCanvasElement, picker: Picker, controls: { enabled: boolean }): void {
+    this.page.watch(["tool"], () => (controls.enabled = !this.drawing));
     canvas.addEventListener("pointerdown", (event) => {
-      if (this.drawing && event.button === 0) this.begin(canvas, event);
+      if (this.drawing && event.button === 0) this.begin(canvas, picker, event);
     });
     canvas.addEventListener("pointermove", (event) => {
       if (this.from) this.drag(event);
@@ -53,7 +59,7 @@ export class Draw {
     if (this.from) {
       this.drag({ clientX: x, clientY: y });
       void this.finish();
-    } else this.beginAt({ clientX: x, clientY: y });
+    } else this.beginAt(this.stage.picker, { clientX: x, clientY: y });
   }
   // What would be drawn to that point of the page.
   look(x: number, y: number): void {
@@ -69,7 +75,7 @@ export class Draw {
 
   // A point at the height where the drag began; at its begin, one that is seen.
   private point({ clientX, clientY }: Place): Point | null {
-    const { picker } = this.stage,
+    const { picker } = this,
       point = this.from
         ? picker.level(clientX, clientY, this.from.z)
         : picker.point(clientX, clientY),
@@ -79,12 +85,13 @@ export class Draw {
     return { x: near(point.x), y: near(point.y), z: Number(point.z.toFixed(3)) };
   }
 
-  private begin(canvas: HTMLCanvasElement, event: PointerEvent): void {
-    this.beginAt(event);
+  private begin(canvas: HTMLCanvasElement, picker: Picker, event: PointerEvent): void {
+    this.beginAt(picker, event);
     canvas.setPointerCapture(event.pointerId);
   }
 
-  private beginAt(place: Place): void {
+  private beginAt(picker: Picker, place: Place): void {
+    this.picker = picker;
     this.from = this.point(place);
     if (this.from) this.to = this.from;
   }

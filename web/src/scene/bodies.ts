@@ -12,6 +12,7 @@ const kSeen_rad = 1e-3; // smaller turns cannot be seen
 export class Bodies {
   description: Description | null = null;
   built: Built | null = null;
+  ceiling = Infinity; // m, up to which standing things are shown
   // links of a model that is shown elsewhere
   private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null;
   private readonly linkWheel = new Map<

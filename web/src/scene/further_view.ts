@@ -3,11 +3,13 @@
 import * as THREE from "three";
 import type { Bodies } from "./bodies";
 import { metrePixels } from "./detail";
+import { Picker } from "./picker";
 import { Viewpoint } from "./viewpoint";
 
 export class FurtherView {
   readonly canvas = document.createElement("canvas");
   readonly view: Viewpoint;
+  readonly picker: Picker;
   private readonly size = { width: 0, height: 0 }; // CSS pixels; 0 while it is not seen
   private readonly observer: ResizeObserver;
 
@@ -15,6 +17,7 @@ export class FurtherView {
   constructor(bodies: Bodies, changed: () => void) {
     this.canvas.tabIndex = 0;
     this.view = new Viewpoint(this.canvas, changed, (robot, into) => bodies.base(robot, into));
+    this.picker = new Picker(this.canvas, this.view.camera, bodies);
     this.observer = new ResizeObserver(([entry]) => {
       const { width, height } = entry!.contentRect;
       Object.assign(this.size, { width, height });

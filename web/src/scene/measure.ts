@@ -3,6 +3,7 @@ import * as THREE from "three";
 import type { Page } from "../state/page";
 import { h, say } from "../widgets/elements";
 import { kOnTop, putOnTop } from "./on_top";
+import type { Picker } from "./picker";
 import type { Stage } from "./stage";
 
 const kLook_ms = 60, // between two looks at what is under the pointer
@@ -25,15 +26,10 @@ export class Measure {
   constructor(
     page: Page,
     private readonly stage: Stage,
-    canvas: HTMLElement,
   ) {
     this.line.visible = false;
     putOnTop(this.line);
     stage.scene.add(this.line);
-    canvas.addEventListener("pointermove", ({ buttons, clientX, clientY }) => {
-      if (buttons === 0) this.look(clientX, clientY);
-    });
-    canvas.addEventListener("pointerleave", () => say(this.readout, this.words));
     page.watch(["tool"], ({ tool }) => {
       this.from = null;
       if (tool === "measure") return;
@@ -41,6 +37,14 @@ export class Measure {
       this.line.visible = false;
       stage.touch();
     });
+  }
+
+  // Tells what is under the pointer of that canvas.
+  listen(canvas: HTMLElement, picker: Picker): void {
+    canvas.addEventListener("pointermove", ({ buttons, clientX, clientY }) => {
+      if (buttons === 0) this.look(clientX, clientY, picker);
+    });
+    canvas.addEventListener("pointerleave", () => say(this.readout, this.words));
   }
 
   // Adds a point: the first one, then the second.
@@ -66,10 +70,10 @@ export class Measure {
   }
 
   // Tells what is under that point of the page.
-  look(x: number, y: number): void {
+  look(x: number, y: number, picker: Picker): void {
     const begun_ms = performance.now();
     if (begun_ms < this.nextLook_ms) return;
-    const point = this.stage.picker.point(x, y),
+    const point = picker.point(x, y),
       end_ms = performance.now();
     this.nextLook_ms = end_ms + Math.max(kLook_ms, (end_ms - begun_ms) / kLookShare);
     if (point && this.from) this.draw(point);

@@ -3,8 +3,6 @@ import * as THREE from "three";
 import type { Bodies } from "./bodies";
 
 export class Picker {
-  ceiling = Infinity; // m, up to which standing things are shown
-
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly camera: THREE.PerspectiveCamera,
@@ -68,7 +66,7 @@ export class Picker {
     const { standing = [], movers = [] } = this.bodies.built ?? {};
     for (const part of [...standing, ...movers]) {
       const { indices, meshes, far, shown } = part,
-        top = standing.includes(part) ? this.ceiling : Infinity;
+        top = standing.includes(part) ? this.bodies.ceiling : Infinity;
       for (const mesh of far ? [...meshes, far.mesh] : meshes) {
         // the old one holds instances as they once were
         if (mesh instanceof THREE.InstancedMesh) mesh.boundingSphere = null;

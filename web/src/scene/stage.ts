@@ -36,6 +36,8 @@ export class Stage {
   onDetail: (reduced: boolean) => void = () => undefined;
   // Called when the browser takes the graphics away, and when it gives them back
   onContext: (there: boolean) => void = () => undefined;
+  // Called with each further view
+  onView: (view: FurtherView) => void = () => undefined;
 
   // full: full detail even with a software rasteriser.
   constructor(
@@ -153,6 +155,7 @@ export class Stage {
   addView(): FurtherView {
     const view = new FurtherView(this.bodies, () => this.touch());
     this.further.add(view);
+    this.onView(view);
     return view;
   }
   removeView(view: FurtherView): void {
@@ -175,15 +178,15 @@ export class Stage {
   // them.
   cutAt(height: number | null): void {
     const ceiling = height ?? Infinity;
-    if (this.picker.ceiling === ceiling) return;
-    this.picker.ceiling = ceiling;
+    if (this.bodies.ceiling === ceiling) return;
+    this.bodies.ceiling = ceiling;
     this.cut();
     this.lights.moved();
     this.touch();
   }
 
   private cut(): void {
-    const { ceiling } = this.picker,
+    const { ceiling } = this.bodies,
       planes = ceiling < Infinity ? [new THREE.Plane(new THREE.Vector3(0, 0, -1), ceiling)] : null;
     for (const { meshes } of this.bodies.built?.standing ?? [])
       for (const material of meshes.flatMap(finishesOf))

@@ -1,7 +1,7 @@
 // Pictures of cameras in panels of their own.
 import type { image_t } from "../../generated/messages";
 import { h } from "../widgets/elements";
-import { Picture } from "../widgets/picture";
+import { Picture, type Source } from "../widgets/picture";
 
 export class CameraPanels {
   private readonly open = new Set<Picture>();
@@ -14,8 +14,8 @@ export class CameraPanels {
   }
 
   // A panel for that channel, to be disposed of when it is closed.
-  make(channel: string, deviceKind: string) {
-    const picture = new Picture(channel, deviceKind);
+  make(channel: string) {
+    const picture = new Picture(channel);
     this.open.add(picture);
     this.changed();
     return {
@@ -28,7 +28,7 @@ export class CameraPanels {
     };
   }
 
-  message(channel: string, message: image_t): void {
-    for (const picture of this.open) if (picture.name === channel) picture.show(message);
+  message(channel: string, message: image_t, source: Source): void {
+    for (const picture of this.open) if (picture.name === channel) picture.show(message, source);
   }
 }

@@ -3,6 +3,7 @@
 // on an edge, Delete on a tab.
 import {
   createDockview,
+  LayoutPriority,
   type DockviewApi,
   type IContentRenderer,
   type IDockviewPanel,
@@ -48,6 +49,7 @@ export class Dock {
     this.api = createDockview(place, {
       theme: { name: "ruedo", className: "dockview-theme-ruedo" },
       disableFloatingGroups: true,
+      proportionalLayout: false,
       defaultTabComponent: "tab",
       createTabComponent: tabLabel,
       createComponent: ({ id, name }) => {
@@ -56,6 +58,13 @@ export class Dock {
         return tab ? pageOf(pages[tab]) : further(make, name);
       },
     });
+    // The room of a window that grows is the view's. Groups have no setting for that.
+    this.api.onDidAddGroup((group) =>
+      Object.defineProperty(group, "priority", {
+        get: () =>
+          group.panels.some(({ id }) => id === kView) ? LayoutPriority.High : LayoutPriority.Normal,
+      }),
+    );
     this.usual();
     for (const event of [this.api.onDidActivePanelChange, this.api.onDidLayoutChange])
       event(() => this.look());

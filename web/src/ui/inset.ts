@@ -3,7 +3,7 @@ import type { image_t } from "../../generated/messages";
 import type { Page } from "../state/page";
 import { h } from "../widgets/elements";
 import { recall, remember } from "../state/memory";
-import { Picture } from "../widgets/picture";
+import { Picture, type Source } from "../widgets/picture";
 
 export class Inset {
   private readonly choice = h("select", { id: "inset", "aria-label": "camera in the view" });
@@ -30,8 +30,8 @@ export class Inset {
     return this.choice.value;
   }
 
-  message(channel: string, message: image_t): void {
-    if (channel === this.channel) this.picture?.show(message);
+  message(channel: string, message: image_t, source: Source): void {
+    if (channel === this.channel) this.picture?.show(message, source);
   }
 
   private list(): void {

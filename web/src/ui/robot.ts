@@ -22,7 +22,7 @@ import { inWorld, type Heading } from "./odometry";
 import { kWindow_s, PolarPlot, TimePlot } from "../widgets/plots";
 import { XYPlot } from "../widgets/xy_plot";
 import { kReasons } from "../state/go_to";
-import { Picture } from "../widgets/picture";
+import { Picture, type Source } from "../widgets/picture";
 
 // At earlier moments; time_s: sim time.
 export interface PastPose {
@@ -332,14 +332,14 @@ export class RobotPages {
     this.ranges.hidden = false;
     this.polar.sonar(device, m);
   }
-  camera(name: string, m: image_t, deviceKind = ""): void {
+  camera(name: string, m: image_t, source: Source): void {
     let picture = this.pictures.get(name);
     if (!picture) {
-      picture = new Picture(name, deviceKind);
+      picture = new Picture(name);
       this.pictures.set(name, picture);
       this.pictureList.append(picture.element);
     }
-    picture.show(m);
+    picture.show(m, source);
   }
 
   draw(): void {

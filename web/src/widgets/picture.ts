@@ -3,6 +3,13 @@
 import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
+// Where a picture comes from: the kind of its device ("" where that is not known), and what its
+// labels are called.
+export interface Source {
+  kind: string;
+  nameOf(label: number): string;
+}
+
 const kMostPixels = 1 << 24;
 const kMostLabels = 16; // in the legend
 const kCount_K = 0.01; // of a thermal camera, unless its file says otherwise
@@ -11,24 +18,26 @@ const kCount_K = 0.01; // of a thermal camera, unless its file says otherwise
 export type Quantity = "colour" | "depth" | "labels" | "temperature";
 export function quantityOf({ pixelformat }: image_t, deviceKind = ""): Quantity {
   if (pixelformat === image_t.PIXEL_FORMAT_FLOAT_GRAY32) return "depth";
+  if (pixelformat === image_t.PIXEL_FORMAT_GRAY && deviceKind === "segmentation_camera")
+    return "labels";
   if (pixelformat !== image_t.PIXEL_FORMAT_LE_GRAY16) return "colour";
   return deviceKind === "thermal_camera" ? "temperature" : "labels";
 }
 
 // The value of a pixel in m or K, or its label; NaN outside of the data.
 export function valueOf(picture: image_t, x: number, y: number, quantity: Quantity): number {
-  const { data, row_stride, height } = picture,
+  const { data, row_stride, height, pixelformat } = picture,
     view = new DataView(data.buffer, data.byteOffset, data.byteLength),
     row = y * (row_stride || data.length / height),
-    size = quantity === "depth" ? 4 : 2,
+    size = quantity === "depth" ? 4 : pixelformat === image_t.PIXEL_FORMAT_GRAY ? 1 : 2,
     at = row + size * x;
   if (at + size > view.byteLength) return NaN;
   if (quantity === "depth") return view.getFloat32(at, true);
+  if (size === 1) return view.getUint8(at);
   return view.getUint16(at, true) * (quantity === "temperature" ? kCount_K : 1);
 }
 
 const words = (value: number, quantity: Quantity): string => {
-  if (quantity === "labels") return value === 0 ? "nothing" : `label ${value}`;
   if (value === Infinity) return "nothing";
   if (value === -Infinity) return "too near";
   return quantity === "depth" ? `${value.toFixed(3)} m` : `${value.toFixed(2)} K`;
@@ -41,16 +50,13 @@ export class Picture {
   readonly element: HTMLElement;
   private next: Blob | null = null; // the newest JPEG, while another one is being decoded
   private reading = false;
-  private raw: image_t | null = null; // the newest picture whose pixels are values
+  private raw: image_t | null = null; // the newest picture
+  private source: Source = { kind: "", nameOf: String };
   private quantity: Quantity = "colour";
   private pointer: [x: number, y: number] | null = null; // shares of the picture
   private range: [low: number, high: number] = [0, 1]; // of its finite values
 
-  // deviceKind: of the sensor that it comes from; "" where that is not known.
-  constructor(
-    readonly name: string,
-    private readonly deviceKind = "",
-  ) {
+  constructor(readonly name: string) {
     this.canvas = h("canvas", {
       class: "picture",
       role: "img",
@@ -79,9 +85,13 @@ export class Picture {
       parts.push(`dark to bright: ${this.darkToBright()}`);
     if (pointer && quantity !== "colour") {
       const [x, y] = [Math.floor(pointer[0] * width), Math.floor(pointer[1] * height)];
-      parts.push(`here ${words(valueOf(raw, x, y, quantity), quantity)}`);
+      parts.push(`here ${this.told(valueOf(raw, x, y, quantity))}`);
     }
     say(this.caption, parts.join(" · "));
+  }
+  private told(value: number): string {
+    if (this.quantity !== "labels") return words(value, this.quantity);
+    return value > 0 ? `label ${this.source.nameOf(value)}` : "nothing";
   }
   private darkToBright(): string {
     const [low, high] = this.range,
@@ -110,21 +120,26 @@ export class Picture {
         if (label > 0) counts.set(label, (counts.get(label) ?? 0) + 1);
       }
     const shown = [...counts].sort((a, b) => b[1] - a[1]).slice(0, kMostLabels),
-      words = shown.map(([label]) => `label ${label}`).join();
+      words = shown.map(([label]) => this.source.nameOf(label)).join();
     this.legend.hidden = shown.length === 0;
     if (this.legend.dataset.labels === words) return;
     this.legend.dataset.labels = words;
     this.legend.replaceChildren(
       ...shown.map(([label]) =>
-        h("span", {}, h("i", { style: `--colour: rgb(${colourOf(label).join()})` }), String(label)),
+        h(
+          "span",
+          {},
+          h("i", { style: `--colour: rgb(${colourOf(label).join()})` }),
+          this.source.nameOf(label),
+        ),
       ),
     );
   }
 
-  show(message: image_t): void {
+  show(message: image_t, source: Source): void {
     const { width, height, pixelformat, data } = message;
-    this.raw = message;
-    this.quantity = quantityOf(message, this.deviceKind);
+    Object.assign(this, { raw: message, source });
+    this.quantity = quantityOf(message, source.kind);
     if (this.quantity !== "colour" && width * height <= kMostPixels) this.measure(message);
     if (this.quantity === "labels" && width * height <= kMostPixels) this.explain(message);
     this.tell();
@@ -178,6 +193,7 @@ function pixelsOf(message: image_t, quantity: Quantity, [low, high]: [number, nu
       let [r, g, b] = [0, 0, 0];
       if (quantity === "temperature")
         r = g = b = (255 * (valueOf(message, x, y, quantity) - low)) / Math.max(0.1, high - low);
+      else if (quantity === "labels") [r, g, b] = colourOf(valueOf(message, x, y, quantity));
       else [r, g, b] = pixel(pixelformat, view, y * stride, x);
       pixels.data.set([r, g, b, 255], 4 * (y * width + x));
     }
@@ -185,11 +201,11 @@ function pixelsOf(message: image_t, quantity: Quantity, [low, high]: [number, nu
   return pixels;
 }
 
-const colourOf = (label: number): [number, number, number] => [
-  ((label * 97) % 200) + 55,
-  ((label * 57) % 200) + 55,
-  ((label * 151) % 200) + 55,
-];
+// Black for nothing.
+const colourOf = (label: number): [number, number, number] =>
+  label > 0
+    ? [((label * 97) % 200) + 55, ((label * 57) % 200) + 55, ((label * 151) % 200) + 55]
+    : [0, 0, 0];
 
 function pixel(format: number, view: DataView, row: number, x: number): [number, number, number] {
   const byte = (at: number) => (at < view.byteLength ? view.getUint8(at) : 0);
@@ -204,11 +220,6 @@ function pixel(format: number, view: DataView, row: number, x: number): [number,
         row + 4 * x + 4 <= view.byteLength ? view.getFloat32(row + 4 * x, true) : Infinity;
       const grey = Number.isFinite(depth) ? 255 / (1 + depth / 3) : 0;
       return [grey, grey, grey];
-    }
-    case image_t.PIXEL_FORMAT_LE_GRAY16: {
-      // a colour for each label
-      const label = row + 2 * x + 2 <= view.byteLength ? view.getUint16(row + 2 * x, true) : 0;
-      return label === 0 ? [0, 0, 0] : colourOf(label);
     }
     default: {
       const grey = byte(row + x);

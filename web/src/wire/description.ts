@@ -64,6 +64,7 @@ export interface Description {
   wheels: number[][]; // link, robot, index among its wheels, a point on the axis, the axis
   bases: { robot: string; body: number; pose: number[]; start: number[] }[];
   joints?: JointDescription[]; // pages of older logs have none
+  classes?: [label: number, ...models: string[]][]; // of segmentation cameras
 }
 export const enum Flag {
   textured = 1,
