@@ -1,5 +1,5 @@
 // The store, the clock, which channels are wanted, and the text about the run.
-import { displayFor, displaysOf } from "../src/state/display";
+import { displayFor, displayKey, displaysOf } from "../src/state/display";
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Clock, clockText } from "../src/state/clock";
 import { shownRobots, stateWords, type PageState } from "../src/state/page";
@@ -236,21 +236,23 @@ it("what is said of the run", () => {
   ]);
 });
 
-describe("how what robots sense is drawn", () => {
-  const usual = displayFor(new Map(), "a");
+describe("how a layer is drawn", () => {
+  const usual = displayFor(new Map(), "points", "a");
   it("is that of the robot, else that of all, else the usual", () => {
     const displays = displaysOf(
       JSON.stringify([
-        ["", { ...usual, size: 2 }],
-        ["a", { ...usual, decay_s: 5 }],
+        [displayKey("points", ""), { ...usual, size: 2 }],
+        [displayKey("points", "a"), { ...usual, decay_s: 5 }],
       ]),
     );
-    expect(displayFor(displays, "a").decay_s).toBe(5);
-    expect(displayFor(displays, "b")).toEqual({ ...usual, size: 2 });
-    expect(displayFor(new Map(), "b")).toEqual(usual);
+    expect(displayFor(displays, "points", "a").decay_s).toBe(5);
+    expect(displayFor(displays, "points", "b")).toEqual({ ...usual, size: 2 });
+    expect(displayFor(displays, "contacts", "a")).toEqual(usual);
+    expect(displayFor(new Map(), "points", "b")).toEqual(usual);
+    expect(displayFor(new Map(), "clouds", "b")).toEqual({ ...usual, colouring: "range" });
   });
   it("takes nothing that is out of its limits", () => {
-    for (const wrong of [{ cover: 2 }, { decay_s: -1 }, { size: null }, { colouring: "x" }])
+    for (const wrong of [{ opacity: 2 }, { decay_s: -1 }, { size: null }, { colouring: "x" }])
       expect(displaysOf(JSON.stringify([["a", { ...usual, ...wrong }]])).size).toBe(0);
     expect(displaysOf("{").size).toBe(0);
   });

@@ -91,7 +91,7 @@ describe("rays and cones", () => {
       return found;
     };
     const alone = opacities();
-    overlay.style(displayFor(new Map(), ""), 4);
+    overlay.style((layer) => displayFor(new Map(), layer, ""), 4);
     expect(alone.length).toBe(2);
     expect(opacities()).toEqual(alone.map((opacity) => opacity / 4));
   });

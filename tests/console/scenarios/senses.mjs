@@ -49,6 +49,18 @@ export default async function senses({ page, until, check, seen, ready, picture 
     ) ?? [0, NaN];
     return Math.abs(metres - 2.9) < 0.02;
   });
+  await page.locator("#inset").selectOption("probe/CLASSES");
+  await page.locator(".inset canvas").hover();
+  await until("a class is told under the pointer, with the model that has it", () =>
+    /here label 40 wall$/.test(document.querySelector(".inset figcaption").textContent),
+  );
+  check(
+    "and explained by its colour below the picture",
+    (await page.locator(".inset .xy-legend").innerText()) === "40 wall",
+    await page.locator(".inset .xy-legend").innerText(),
+  );
+  await page.locator("#inset").selectOption("probe/EYE/depth");
+  await page.locator(".inset canvas").hover();
   await page.getByRole("tab", { name: "Channels" }).click();
   const told = () => document.querySelector(".inset figcaption").textContent;
   const before = await page.evaluate(told);
@@ -120,14 +132,29 @@ export default async function senses({ page, until, check, seen, ready, picture 
   };
   await page.getByRole("tab", { name: "World" }).click();
   const usual = await page.evaluate(cloud);
-  await page.getByLabel("size of points").fill("2");
+  const layerChoice = page.getByLabel("layer", { exact: true });
+  await layerChoice.selectOption("rays");
+  check(
+    "what a layer has not is not offered",
+    (await page.getByLabel("coloured by").isHidden()) &&
+      (await page.getByLabel("strength").isVisible()),
+  );
+  await layerChoice.selectOption("clouds");
+  await page.getByLabel("size", { exact: true }).fill("2");
   await until(
     "points are larger",
     (size) =>
       window.ruedo.overlays.of.get("probe").clouds.get("LIDAR").object.material.size === size,
     4 * usual[0],
   );
-  await page.getByLabel("colour of clouds").selectOption("height");
+  check(
+    "points of another layer stay as they are",
+    (await page.evaluate(() => {
+      const overlay = window.ruedo.overlays.of.get("probe");
+      return [overlay.contacts.object.material.size, overlay.display("points").size].join();
+    })) === "9,1",
+  );
+  await page.getByLabel("coloured by").selectOption("height");
   // Of two points that are equally far, and not equally high
   await until("and coloured by height", () => {
     const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR"),

@@ -2,10 +2,11 @@
 import * as THREE from "three";
 import { image_t, type device_info_t, type lidar_t } from "../../generated/messages";
 import type { Display } from "../state/display";
+import { coloursOf } from "./colouring";
 import { matrixOf } from "./matrix";
 
 const kSize_px = 2.5,
-  kHighest_m = 3; // above the floor: the coldest colour
+  kPlain = new THREE.Color(0xffd24a);
 const kMostPoints = 40_000; // of a picture; of larger ones every second or third row and column
 
 // x, y, z of each return in turn.
@@ -30,7 +31,10 @@ export function pointsOfLidar(scan: lidar_t): Float32Array {
 }
 
 // How bright each return is, 0 to 1; null if the scanner does not tell.
-export function intensitiesOf({ ranges, intensities }: lidar_t): Float32Array | null {
+export function intensitiesOf({
+  ranges,
+  intensities,
+}: Pick<lidar_t, "ranges" | "intensities">): Float32Array | null {
   if (intensities.length !== ranges.length) return null;
   return intensities.filter((_, i) => Number.isFinite(ranges[i]));
 }
@@ -95,27 +99,16 @@ export class Cloud {
     return { points: this.points, colours: colours.array as Float32Array };
   }
 
-  style({ size, cover, colouring }: Display): void {
+  style({ size, opacity, colouring }: Display): void {
     const { material } = this.object;
-    Object.assign(material, { size: kSize_px * size, opacity: cover, transparent: cover < 1 });
+    Object.assign(material, { size: kSize_px * size, opacity, transparent: opacity < 1 });
     this.colouring = colouring;
     this.paint();
   }
 
-  // Warm is near, low, or bright; cold is far, high, or dim.
   private paint(): void {
-    const { points, intensities, object } = this,
-      mount_z = this.mount.elements[14]!,
-      colours = new Float32Array(points.length),
-      colour = new THREE.Color();
-    const cold = (i: number) => {
-      const [x, y, z] = [points[i]!, points[i + 1]!, points[i + 2]!];
-      if (this.colouring === "height") return Math.max(0, Math.min(1, (z + mount_z) / kHighest_m));
-      if (this.colouring === "intensity" && intensities) return 1 - intensities[i / 3]!;
-      return 1 - Math.exp(-Math.hypot(x, y, z) / 6);
-    };
-    for (let i = 0; i < points.length; i += 3)
-      colour.setHSL(0.66 * cold(i), 1, 0.55).toArray(colours, i);
+    const { points, intensities, colouring, mount, object } = this,
+      colours = coloursOf(points, intensities, colouring, mount.elements[14]!, kPlain);
     object.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
   }
 

@@ -11,7 +11,8 @@ import type {
 } from "../../generated/messages";
 import { displayFor, type Display } from "../state/display";
 import type { Layer } from "../state/layers";
-import { Cloud } from "./clouds";
+import { Cloud, intensitiesOf } from "./clouds";
+import { coloursOf } from "./colouring";
 import { matrixOf } from "./matrix";
 import { kOnTop, putOnTop } from "./on_top";
 import { PastPoints } from "./past_points";
@@ -57,7 +58,22 @@ class Strip<T extends THREE.Object3D & { geometry: THREE.BufferGeometry }> {
     }
     this.object.geometry.setDrawRange(0, count);
   }
+  // The colours of the vertices.
+  paint(colours: Float32Array): void {
+    const { geometry } = this.object;
+    let attribute = geometry.getAttribute("color") as THREE.BufferAttribute | undefined;
+    if (!attribute || attribute.count < this.capacity) {
+      attribute = new THREE.BufferAttribute(new Float32Array(3 * this.capacity), 3);
+      geometry.setAttribute("color", attribute.setUsage(THREE.DynamicDrawUsage));
+    }
+    (attribute.array as Float32Array).set(colours);
+    attribute.needsUpdate = true;
+  }
 }
+
+// Makes a material see-through, or not.
+const fade = <M extends THREE.Material>(material: M, opacity: number) =>
+  Object.assign(material, { opacity, transparent: opacity < 1 });
 
 const glow = (colour: number, opacity: number) =>
   new THREE.MeshBasicMaterial({
@@ -76,7 +92,12 @@ const kFan = 0.1,
   kCones = 0.16;
 const kPoint_px = 4,
   kPast_px = 2.5;
+const kContact_px = 9;
+const kPlainPoints = new THREE.Color(kColours.points);
 const kInto = new THREE.Matrix4();
+
+// How a layer of the robot is drawn.
+export type DisplayOf = (layer: Layer) => Display;
 
 class ScanView {
   readonly group = new THREE.Group();
@@ -99,7 +120,7 @@ class ScanView {
     new THREE.Points(
       new THREE.BufferGeometry(),
       new THREE.PointsMaterial({
-        color: kColours.points,
+        vertexColors: true,
         size: kPoint_px,
         sizeAttenuation: false,
         toneMapped: false,
@@ -109,6 +130,9 @@ class ScanView {
   );
   readonly mount = new THREE.Matrix4();
   private hits = 0;
+  private colours: Float32Array = new Float32Array();
+  private intensities: Float32Array | null = null;
+  private colouring: Display["colouring"] = "plain";
 
   constructor(private readonly device: device_info_t) {
     devicePose(device, this.mount);
@@ -119,16 +143,30 @@ class ScanView {
   // What it saw last, in its own frame.
   get seen(): { points: Float32Array; colours: Float32Array } {
     const all = this.points.object.geometry.getAttribute("position") as THREE.BufferAttribute,
-      points = (all.array as Float32Array).subarray(0, 3 * this.hits),
-      colour = new THREE.Color(kColours.points).toArray();
-    return { points, colours: points.map((_, i) => colour[i % 3]!) };
+      points = (all.array as Float32Array).subarray(0, 3 * this.hits);
+    return { points, colours: this.colours };
   }
 
-  style({ size, cover }: Display, strength: number): void {
-    this.fan.object.material.opacity = Math.min(1, kFan * strength);
-    this.lines.object.material.opacity = Math.min(1, kRays * strength);
-    const { material } = this.points.object;
-    Object.assign(material, { size: kPoint_px * size, opacity: cover, transparent: cover < 1 });
+  style(of: DisplayOf, share: number): void {
+    const { strength } = of("rays"),
+      { size, opacity, colouring } = of("points"),
+      { material } = this.points.object;
+    this.fan.object.material.opacity = Math.min(1, kFan * strength * share);
+    this.lines.object.material.opacity = Math.min(1, kRays * strength * share);
+    fade(material, opacity).size = kPoint_px * size;
+    this.colouring = colouring;
+    if (this.hits > 0) this.paint();
+  }
+
+  private paint(): void {
+    this.colours = coloursOf(
+      this.seen.points,
+      this.intensities,
+      this.colouring,
+      this.mount.elements[14]!,
+      kPlainPoints,
+    );
+    this.points.paint(this.colours);
   }
 
   show(scan: planar_lidar_t): void {
@@ -153,6 +191,8 @@ class ScanView {
     });
     this.points.object.geometry.setDrawRange(0, hits);
     this.hits = hits;
+    this.intensities = intensitiesOf(scan);
+    if (n > 0) this.paint();
     const every = Math.max(1, Math.round(n / 180));
     const shown = Math.ceil(n / every);
     this.lines.write(2 * shown, (p) => {
@@ -212,8 +252,8 @@ class SonarView {
     this.group.matrixAutoUpdate = false;
   }
 
-  style(_: Display, strength: number): void {
-    this.cones.object.material.opacity = Math.min(1, kCones * strength);
+  style(of: DisplayOf, share: number): void {
+    this.cones.object.material.opacity = Math.min(1, kCones * of("sonar").strength * share);
   }
 
   show(sonar: sonar_t): void {
@@ -309,19 +349,19 @@ export class RobotOverlay {
       new THREE.BufferGeometry(),
       new THREE.PointsMaterial({
         color: kColours.contacts,
-        size: 9,
+        size: kContact_px,
         sizeAttenuation: false,
         ...kOnTop,
       }),
     ),
   );
   private readonly frames = new THREE.Group();
-  private readonly baseFrame = new THREE.AxesHelper(0.5);
+  private readonly baseFrame = new THREE.Group();
   private readonly odom = new THREE.Matrix4(); // odom in the world
   private readonly point = new THREE.Vector3();
   private changed = true;
-  private strength = 1;
-  private display: Display = displayFor(new Map(), "");
+  private share = 1; // of the opacity of rays and cones
+  private display: DisplayOf = (layer) => displayFor(new Map(), layer, "");
 
   constructor(
     devices: device_info_t[],
@@ -332,6 +372,7 @@ export class RobotOverlay {
     matrixOf(start, 0, this.odom);
     const odomFrame = new THREE.AxesHelper(0.35);
     odomFrame.applyMatrix4(this.odom);
+    this.baseFrame.add(new THREE.AxesHelper(0.5));
     this.frames.add(this.baseFrame, odomFrame);
     this.baseFrame.matrixAutoUpdate = false;
     for (const device of devices) {
@@ -369,7 +410,7 @@ export class RobotOverlay {
     let cloud = this.clouds.get(device.name);
     if (!cloud) {
       cloud = new Cloud(device);
-      cloud.style(this.display);
+      cloud.style(this.display("clouds"));
       this.clouds.set(device.name, cloud);
       this.group.add(cloud.object);
     }
@@ -383,7 +424,7 @@ export class RobotOverlay {
     time_s: number,
     { seen, mount }: Pick<ScanView, "seen" | "mount">,
   ): void {
-    const { decay_s, size, cover } = this.display;
+    const { decay_s, size, opacity } = this.display(this.clouds.has(device) ? "clouds" : "points");
     let past = this.past.get(device);
     if (!past) {
       if (decay_s === 0) return;
@@ -391,8 +432,7 @@ export class RobotOverlay {
       this.past.set(device, past);
       this.group.add(past.object);
     }
-    const { material } = past.object;
-    Object.assign(material, { size: kPast_px * size, opacity: cover, transparent: cover < 1 });
+    fade(past.object.material, opacity).size = kPast_px * size;
     past.add(time_s, decay_s, seen, kInto.multiplyMatrices(this.base, mount));
   }
   pose(message: pose_t): void {
@@ -413,12 +453,19 @@ export class RobotOverlay {
     this.changed = true;
   }
   // robots: how many there are; their rays and cones lie over each other, and are painted fainter.
-  style(display: Display, robots: number): void {
+  style(display: DisplayOf, robots: number): void {
     this.display = display;
-    this.strength = display.opacity / Math.max(1, robots);
+    this.share = 1 / Math.max(1, robots);
     for (const view of [...this.scans.values(), ...this.sonars.values()])
-      view.style(display, this.strength);
-    for (const cloud of this.clouds.values()) cloud.style(display);
+      view.style(display, this.share);
+    for (const cloud of this.clouds.values()) cloud.style(display("clouds"));
+    fade(this.truth.strip.object.material as THREE.Material, display("trail").opacity);
+    fade(this.odometry.strip.object.material as THREE.Material, display("odometry").opacity);
+    const { size, opacity } = display("contacts");
+    Object.assign(this.contacts.object.material, { opacity, size: kContact_px * size });
+    this.frames.traverse((axes) => {
+      if (axes instanceof THREE.AxesHelper) axes.scale.setScalar(display("frames").size);
+    });
     this.changed = true;
   }
   contact(message: contact_t): void {
@@ -472,7 +519,7 @@ export class RobotOverlay {
     let view = views.get(device.name);
     if (!view) {
       view = new Make(device);
-      view.style(this.display, this.strength);
+      view.style(this.display, this.share);
       views.set(device.name, view);
       this.group.add(view.group);
     }

@@ -1,27 +1,49 @@
-// How what robots sense is drawn: of all robots, and of single ones that differ.
+// How each layer is drawn: of all robots, and of single ones that differ.
+import type { Layer } from "./layers";
 import { recall, remember } from "./memory";
 
-export const kColourings = ["range", "height", "intensity"] as const;
+export const kColourings = ["plain", "range", "height", "intensity"] as const;
 export interface Display {
-  size: number; // of points, times the usual one
-  opacity: number; // of rays and cones, times the usual one
-  cover: number; // opacity of points
+  size: number; // of points and axes, times the usual one
+  strength: number; // of rays and cones, times the usual opacity
+  opacity: number; // of points and lines
   decay_s: number; // how long points stay, sim time
-  colouring: (typeof kColourings)[number]; // of clouds
+  colouring: (typeof kColourings)[number]; // of points
 }
-const kUsual: Display = { size: 1, opacity: 1, cover: 1, decay_s: 0, colouring: "range" };
 // The least and the most of each.
 export const kLimits = {
   size: [0.25, 4],
-  opacity: [0.25, 4],
-  cover: [0.1, 1],
+  strength: [0.25, 4],
+  opacity: [0.1, 1],
   decay_s: [0, 60],
 } as const;
 
-// By the name of the robot; "": of those that are not named.
+const kOfPoints: readonly (keyof Display)[] = ["size", "opacity", "decay_s", "colouring"];
+// What can be set of which layer.
+export const kSettings: Partial<Record<Layer, readonly (keyof Display)[]>> = {
+  rays: ["strength"],
+  points: kOfPoints,
+  sonar: ["strength"],
+  clouds: kOfPoints,
+  trail: ["opacity"],
+  odometry: ["opacity"],
+  contacts: ["size", "opacity"],
+  frames: ["size"],
+};
+
+// By layer and robot; of no robot: of all that have none of their own.
 export type Displays = ReadonlyMap<string, Display>;
-export const displayFor = (displays: Displays, robot: string) =>
-  displays.get(robot) ?? displays.get("") ?? kUsual;
+export const displayKey = (layer: Layer, robot: string) => `${layer} ${robot}`;
+export const displayFor = (displays: Displays, layer: Layer, robot: string): Display =>
+  displays.get(displayKey(layer, robot)) ?? displays.get(displayKey(layer, "")) ?? usual(layer);
+
+const usual = (layer: Layer): Display => ({
+  size: 1,
+  strength: 1,
+  opacity: 1,
+  decay_s: 0,
+  colouring: layer === "clouds" ? "range" : "plain",
+});
 
 // What is wrong is as usual.
 export function displaysOf(text: string | null): Displays {
