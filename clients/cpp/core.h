@@ -78,6 +78,8 @@ class Core : public std::enable_shared_from_this<Core> {
   // What comes may be of the next run, of which there is no info yet. The receiving thread's.
   bool in_doubt() const { return watch_.in_doubt(); }
   RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
+  // Asked for once, and again where the world has changed.
+  JointLimits joint_limits(const std::string& robot);
   int64_t utime() const { return clock_.utime(); }
   int64_t next_id() { return ++ids_; }
 
@@ -139,6 +141,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::atomic<bool> is_over_{false};
   std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;
+  std::map<std::string, JointLimits> joint_limits_;  // by robot
+  std::shared_ptr<const WorldInfo> joint_limits_of_;
   std::set<std::shared_ptr<Driver>> repeating_;
   std::map<std::thread::id, int64_t> ends_;  // of the motions that threads awaited, the last
   std::atomic<int64_t> ids_{0};

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core.h"
+#include "joint.h"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
@@ -75,12 +76,14 @@ Stream<SampleType> camera_part(Core& core, const DeviceInfo& camera, const std::
                     "; <ruedo:" + part + "> in the world file switches it on");
 }
 
-std::string input_channel(Core& core, const std::string& robot, const std::string& type) {
+std::string input_channel(Core& core, const std::string& robot, const std::string& type,
+                          const std::string& lack = "") {
   const bool drives = !core.robot_info(robot).drive.empty();
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
     if (channel.input && channel.type == type) return channel.name;
   }
+  if (!lack.empty()) throw NotSupported(robot + " takes no " + type + ": " + lack);
   if (!drives)
     throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot +
                        "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
@@ -118,13 +121,17 @@ void listen(Core& core, const std::string& robot, Driver& driver) {
 
 // in_steps: the call to make in lockstep, where what is sent beside the steps would act at whatever
 // step the run has reached.
-std::shared_ptr<Driver> driver_of(Core& core, const std::string& robot,
-                                  const std::string& in_steps) {
-  const auto driver = core.driver(robot);
+void check_acts_at_once(const Core& core, const std::string& in_steps) {
   if (core.in_lockstep())
     throw NotSupported(
         "in lockstep a command acts at a step that its client chooses: sim.step(n, {robot." +
         in_steps + "})");
+}
+
+std::shared_ptr<Driver> driver_of(Core& core, const std::string& robot,
+                                  const std::string& in_steps) {
+  const auto driver = core.driver(robot);
+  check_acts_at_once(core, in_steps);
   return driver;
 }
 
@@ -265,6 +272,22 @@ Stream<MotionStatus> Robot::motion() const {
   return first_stream<MotionStatus>(*core_, name_, "motion status");
 }
 Stream<Joints> Robot::joints() const { return first_stream<Joints>(*core_, name_, "joints"); }
+
+Joint Robot::joint(const std::string& name) const { return {core_, name_, name}; }
+
+void Robot::command_joints(const std::map<std::string, double>& values, JointMode mode) const {
+  core_->check_open();
+  check_acts_at_once(*core_, "joint_command({...})");
+  const Command command = joint_command(values, mode);
+  core_->bus().publish(command.channel, command.bytes.data(), command.bytes.size());
+}
+
+Command Robot::joint_command(const std::map<std::string, double>& values, JointMode mode) const {
+  const std::string channel = input_channel(*core_, name_, "joint_command_t", "it has no joints");
+  joint_command_t command = joint_message(name_, core_->joint_limits(name_), values, mode);
+  command.utime = core_->utime();
+  return {channel, encoded(command)};
+}
 
 Camera Robot::camera() const {
   const DeviceInfo camera = first_device<Image>(*core_, name_, "camera").info();

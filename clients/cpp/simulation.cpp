@@ -117,6 +117,31 @@ void Simulation::sleep(Duration time) const {
   core->sleep(std::llround(seconds * 1e6));
 }
 
+Every Simulation::every(Duration period) const {
+  const int64_t period_us = std::isfinite(period.count()) ? std::llround(period.count() * 1e6) : 0;
+  if (period_us < 1)
+    throw std::invalid_argument("period is " + text_of(period) +
+                                ": it must be a number of seconds above 0");
+  return {core(), period_us};
+}
+
+// Until the next multiple of the period; those that have passed meanwhile are left out.
+std::optional<double> Every::next() const {
+  core_->check_open();
+  if (core_->in_lockstep())
+    throw NotSupported("in lockstep nothing goes on without its clients: use sim.step(n)");
+  const int64_t begin = core_->utime();
+  const int64_t following = (begin / period_us_ + 1) * period_us_;
+  const bool in_time = begin < next_us_ + period_us_ && next_us_ + period_us_ <= following;
+  next_us_ = in_time ? next_us_ + period_us_ : following;  // the first, late, or a reset
+  try {
+    core_->sleep(next_us_ - begin);
+  } catch (const RunEnded&) {
+    return std::nullopt;
+  }
+  return static_cast<double>(next_us_) * 1e-6;
+}
+
 Subscription Simulation::on_new_run(std::function<void()> callback) const {
   return core()->on_new_run(std::move(callback));
 }

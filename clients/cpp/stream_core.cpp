@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
+#include <type_traits>
 #include <utility>
 
 #include "core.h"
@@ -35,6 +37,7 @@ class StreamCore::Arrival {
     if (!sample_) sample_ = stream.decoded(bytes_);
     return sample_;
   }
+  size_t size() const { return bytes_.size(); }
   std::optional<int64_t> utime() const { return utime_; }  // us; nothing: its type does not say
 
  private:
@@ -117,6 +120,8 @@ void StreamCore::forget() {
   newest_ = nullptr;
   fault_ = nullptr;
   last_utime_.reset();
+  kept_.clear();
+  kept_bytes_ = 0;
 }
 
 void StreamCore::end() {
@@ -148,6 +153,7 @@ void StreamCore::on_message(const uint8_t* bytes, size_t size) {
     const std::lock_guard lock(mutex_);
     newest_ = arrival;
     fault_ = nullptr;
+    keep(arrival);
     count_ += 1 + lost_before(utime);
     if (!waiting_.empty()) core->progress().use(core->utime(), waiting_);
   }
@@ -186,6 +192,49 @@ std::shared_ptr<const Sample> StreamCore::decoded(const std::vector<uint8_t>& by
     throw TypeMismatch(channel_ + ": a message of " + std::to_string(bytes.size()) +
                        " bytes is not a valid " + type_ + ": " + error.what());
   }
+}
+
+void StreamCore::keep(const std::shared_ptr<Arrival>& arrival) {
+  constexpr size_t kMost = 256, kMostBytes = 4u << 20;
+  if (!arrival->utime()) return;
+  if (!kept_.empty() && *arrival->utime() < *kept_.back()->utime()) {  // sim time was reset
+    kept_.clear();
+    kept_bytes_ = 0;
+  }
+  kept_.push_back(arrival);
+  kept_bytes_ += arrival->size();
+  while (kept_.size() > kMost || kept_bytes_ > kMostBytes) {
+    kept_bytes_ -= kept_.front()->size();
+    kept_.pop_front();
+  }
+}
+
+int64_t StreamCore::kept_from() {
+  const std::lock_guard lock(mutex_);
+  return kept_.empty() ? 0 : *kept_.front()->utime();
+}
+
+std::optional<StreamCore::Neighbours> StreamCore::around(int64_t utime, Duration timeout) {
+  const auto core = connection();
+  if (!find_decoder(type_))
+    throw NotSupported(channel_ + " carries " + type_ + ", whose messages have no time");
+  subscribe(*core);
+  core->note_use();
+  core->bus().catch_up();
+  std::shared_ptr<Arrival> before, after;
+  {
+    std::unique_lock lock(mutex_);
+    await(*core, lock, timeout,
+          [&] { return !kept_.empty() && *kept_.back()->utime() >= utime; });
+    const auto found =
+        std::find_if(kept_.begin(), kept_.end(),
+                     [&](const auto& arrival) { return *arrival->utime() >= utime; });
+    after = *found;
+    if (*after->utime() != utime && found == kept_.begin()) return std::nullopt;
+    before = *after->utime() == utime ? after : *std::prev(found);
+  }
+  core->note_use();
+  return Neighbours{before->sample(*this), after->sample(*this)};
 }
 
 // How many samples are missing since the last one. With the mutex held, as the next two.
@@ -272,6 +321,32 @@ SampleType Stream<SampleType>::latest(Duration timeout) const {
 template <class SampleType>
 SampleType Stream<SampleType>::next(Duration timeout) const {
   return static_cast<const SampleType&>(*core_->read(seen_, skipped_, true, timeout));
+}
+
+template <class SampleType>
+std::optional<SampleType> Stream<SampleType>::find(int64_t utime, Duration timeout) const {
+  const auto found = core_->around(utime, timeout);
+  if (!found) return std::nullopt;
+  const auto& before = static_cast<const SampleType&>(*found->before);
+  const auto& after = static_cast<const SampleType&>(*found->after);
+  if (before.utime == utime) return before;
+  if constexpr (std::is_same_v<SampleType, Pose> || std::is_same_v<SampleType, Odometry>)
+    return before.interpolated(after, utime);
+  return utime - before.utime < after.utime - utime ? before : after;
+}
+
+template <class SampleType>
+SampleType Stream<SampleType>::at(int64_t utime, Duration timeout) const {
+  if (auto found = find(utime, timeout)) return *std::move(found);
+  throw Timeout(channel() + " has no sample of " + text_of(static_cast<double>(utime) * 1e-6) +
+                " s: those that it has kept, from its first use on, begin at " +
+                text_of(static_cast<double>(core_->kept_from()) * 1e-6) +
+                " s. Use it before, or sim.synchronised()");
+}
+
+template <class SampleType>
+void Stream<SampleType>::subscribe() const {
+  core_->listen();
 }
 
 template <class SampleType>

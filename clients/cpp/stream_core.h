@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -41,6 +42,14 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   // TypeMismatch, NoServer.
   std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, std::atomic<int64_t>& skipped,
                                      bool new_one, Duration timeout);
+  struct Neighbours {
+    std::shared_ptr<const Sample> before, after;  // the same where one is of the moment
+  };
+  // Around a moment (us), once the stream has come so far. Nothing: it is before what is kept.
+  // Throws as read() does.
+  std::optional<Neighbours> around(int64_t utime, Duration timeout);
+  int64_t kept_from();  // us; 0: nothing is kept
+  void listen() { subscribe(*connection()); }
   int64_t missed() const { return *missed_; }  // by the callbacks
   Subscription on_sample(std::function<void(const Sample&)> callback);
   // The same in the receiving thread, for what is this library's own.
@@ -57,6 +66,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   void subscribe(Core& core);
   void on_message(const uint8_t* bytes, size_t size);
   void fail(std::exception_ptr fault);
+  void keep(const std::shared_ptr<Arrival>& arrival);  // with the mutex held
   void call_back(Arrival& arrival);
   std::shared_ptr<const Sample> decoded(const std::vector<uint8_t>& bytes) const;
   int64_t lost_before(std::optional<int64_t> utime);
@@ -80,6 +90,8 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   std::mutex mutex_;  // what follows
   std::condition_variable news_;
   std::shared_ptr<Arrival> newest_;
+  std::deque<std::shared_ptr<Arrival>> kept_;  // for around(), the newest last
+  size_t kept_bytes_ = 0;
   int64_t count_ = 0;  // samples that came or were lost
   std::optional<int64_t> last_utime_;
   std::vector<std::thread::id> waiting_;  // for a sample

@@ -19,11 +19,13 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "ruedo/client_markers.h"
@@ -119,6 +121,43 @@ class [[nodiscard]] Subscription {
   std::shared_ptr<CallbackCore> core_;
 };
 
+template <class SampleType>
+class Stream;
+
+/// Goes through the samples of a stream, from the next one on, until the run ends:
+/// `for (const Scan& scan : robot.lrf())`. A loop slower than the stream gets the newest each time.
+/// @tparam SampleType of the stream
+template <class SampleType>
+class SampleIterator {
+ public:
+  /// @cond
+  using iterator_category = std::input_iterator_tag;
+  using value_type = SampleType;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const SampleType*;
+  using reference = const SampleType&;
+  SampleIterator() = default;  // the end
+  explicit SampleIterator(const Stream<SampleType>& stream) : stream_(&stream) { ++*this; }
+  const SampleType& operator*() const { return *sample_; }
+  const SampleType* operator->() const { return &*sample_; }
+  SampleIterator& operator++() {
+    try {
+      sample_ = stream_->next(kForever);
+    } catch (const RunEnded&) {
+      stream_ = nullptr;
+    }
+    return *this;
+  }
+  void operator++(int) { ++*this; }
+  bool operator==(const SampleIterator& other) const { return stream_ == other.stream_; }
+  bool operator!=(const SampleIterator& other) const { return stream_ != other.stream_; }
+  /// @endcond
+
+ private:
+  const Stream<SampleType>* stream_ = nullptr;
+  std::optional<SampleType> sample_;
+};
+
 /// A stream of samples from one channel. The first use subscribes.
 ///
 /// Each Stream is a reader of its own: next() goes by what this object has returned, not by what
@@ -156,6 +195,23 @@ class Stream {
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
+  /// The sample of a moment: waits until the stream has come so far. Where no sample is of that
+  /// moment, a pose or odometry is interpolated between its neighbours, and of other streams it is
+  /// the nearest. A stream keeps its last 256 samples, of 4 MB at most, from its first use on.
+  /// @param utime us of sim time, such as `scan.utime`
+  /// @param timeout of real time
+  /// @return a copy
+  /// @throws Timeout, also for a moment before what is kept: Simulation::synchronised() joins
+  /// streams from the beginning; TypeMismatch, NoServer
+  [[nodiscard]] SampleType at(int64_t utime, Duration timeout = 5.0) const;
+  /// @cond
+  // Nothing: the moment is before what is kept.
+  [[nodiscard]] std::optional<SampleType> find(int64_t utime, Duration timeout) const;
+  void subscribe() const;
+  /// @endcond
+  /// @return its samples, from the next one on
+  SampleIterator<SampleType> begin() const { return SampleIterator<SampleType>(*this); }
+  SampleIterator<SampleType> end() const { return {}; }  ///< @return where the run has ended
   /// Calls back for every sample from now on. All callbacks of a simulation run in one thread of
   /// their own, one at a time, in the order in which the samples came; in lockstep those of the
   /// steps of step() return before it does. A server that launch() started waits for them. With
@@ -298,9 +354,114 @@ class Device : public Stream<SampleType> {
   const DeviceInfo& info() const { return info_; }
   /// @return as the world file has it
   const std::string& name() const { return info_.name; }
+  /// @return its frame in base_link at the start
+  Transform transform() const { return {info_.position, info_.orientation}; }
 
  private:
   DeviceInfo info_;
+};
+
+/// Streams joined by stamp, from Simulation::synchronised().
+/// @tparam First sample of the first stream
+/// @tparam Others samples of the others
+template <class First, class... Others>
+class Synchronised {
+ public:
+  /// @cond
+  using Joined = std::tuple<First, Others...>;
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = Joined;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Joined*;
+    using reference = const Joined&;
+    explicit Iterator(const Synchronised* of) : of_(of) {
+      if (of_) ++*this;
+    }
+    const Joined& operator*() const { return *joined_; }
+    Iterator& operator++() {
+      joined_.reset();
+      try {
+        while (!joined_) joined_ = of_->next();
+      } catch (const RunEnded&) {
+        of_ = nullptr;
+      }
+      return *this;
+    }
+    bool operator!=(const Iterator& other) const { return of_ != other.of_; }
+
+   private:
+    const Synchronised* of_;
+    std::optional<Joined> joined_;
+  };
+  Synchronised(Stream<First> first, Stream<Others>... others)
+      : first_(std::move(first)), others_(std::move(others)...) {
+    std::apply([](const auto&... stream) { (stream.subscribe(), ...); }, others_);
+  }
+  Iterator begin() const { return Iterator(this); }
+  Iterator end() const { return Iterator(nullptr); }
+  /// @endcond
+
+ private:
+  std::optional<Joined> next() const {
+    const First sample = first_.next(kForever);
+    return std::apply(
+        [&](const auto&... stream) -> std::optional<Joined> {
+          const auto found = std::make_tuple(stream.find(sample.utime, 5.0)...);
+          const bool whole =
+              std::apply([](const auto&... one) { return (one.has_value() && ...); }, found);
+          if (!whole) return std::nullopt;  // it came before the others' first
+          return std::apply([&](const auto&... one) { return Joined(sample, *one...); }, found);
+        },
+        others_);
+  }
+
+  Stream<First> first_;
+  std::tuple<Stream<Others>...> others_;
+};
+
+/// A loop at a fixed period of sim time, from Simulation::every().
+class Every {
+ public:
+  /// @cond
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = double;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const double*;
+    using reference = double;
+    explicit Iterator(const Every* of) : of_(of) {
+      if (of_) ++*this;
+    }
+    double operator*() const { return time_; }
+    Iterator& operator++() {
+      const std::optional<double> next = of_->next();
+      if (next)
+        time_ = *next;
+      else
+        of_ = nullptr;
+      return *this;
+    }
+    bool operator!=(const Iterator& other) const { return of_ != other.of_; }
+
+   private:
+    const Every* of_;
+    double time_ = 0.0;
+  };
+  Every(std::shared_ptr<Core> core, int64_t period_us)
+      : core_(std::move(core)), period_us_(period_us) {}
+  Iterator begin() const { return Iterator(this); }
+  Iterator end() const { return Iterator(nullptr); }
+  /// @endcond
+
+ private:
+  std::optional<double> next() const;  // s; nothing: the run has ended
+
+  std::shared_ptr<Core> core_;
+  int64_t period_us_;
+  mutable int64_t next_us_ = 0;
 };
 
 /// A camera, and its further channels.
@@ -360,6 +521,47 @@ struct Limits {
   double speed = 0.0;         ///< 0 or more
   double acceleration = 0.0;  ///< 0 or more
   double deceleration = 0.0;  ///< 0 or more
+};
+
+/// A joint of a robot, from Robot::joint(). Copies are the same joint.
+class Joint {
+ public:
+  /// @cond
+  Joint(std::shared_ptr<Core> core, std::string robot, std::string name);
+  /// @endcond
+  const std::string& name() const { return name_; }  ///< @return as the file has it
+  /// @return revolute, continuous, prismatic, ...
+  const std::string& kind() const { return kind_; }
+  double lower() const { return lower_; }  ///< @return rad or m; -inf where there is no limit
+  double upper() const { return upper_; }  ///< @return rad or m; +inf where there is no limit
+  double max_velocity() const { return max_velocity_; }  ///< @return rad/s or m/s; +inf: no limit
+  double max_effort() const { return max_effort_; }      ///< @return N m or N; +inf: no limit
+  /// @return false of a joint that mimics another, of a gearbox and of a ball joint
+  bool takes_commands() const { return takes_commands_; }
+  /// @return true where the file has a controller, a transmission or a servo for it: it holds its
+  /// position until its first command. The others are free until then.
+  bool holds() const { return holds_; }
+
+  /// @name Of the newest sample
+  /// They throw Timeout and NoServer.
+  /// @{
+  [[nodiscard]] double position() const;  ///< @return rad or m
+  [[nodiscard]] double velocity() const;  ///< @return rad/s or m/s
+  [[nodiscard]] double effort() const;    ///< @return N m or N, of its motor
+  /// @}
+  /// @name Commands
+  /// Each holds until the joint's next one. They throw as Robot::command_joints() does.
+  /// @{
+  void set_position(double value) const;  ///< @param value rad or m, kept within the limits
+  void set_velocity(double value) const;  ///< @param value rad/s or m/s
+  void set_effort(double value) const;    ///< @param value N m or N
+  /// @}
+
+ private:
+  std::shared_ptr<Core> core_;
+  std::string robot_, name_, kind_;
+  double lower_, upper_, max_velocity_, max_effort_;
+  bool takes_commands_, holds_;
 };
 
 /// A robot of the simulation: its sensors and its drive. Copies are the same robot.
@@ -431,6 +633,18 @@ class Robot {
   /// @return positions, velocities and efforts of its joints
   /// @throws UnknownName, NoServer
   Stream<Joints> joints() const;
+  /// @param name of a joint
+  /// @return its limits, its state and its commands
+  /// @throws UnknownName, which lists the joints; NoServer
+  [[nodiscard]] Joint joint(const std::string& name) const;
+  /// Commands joints by their names: `{{"shoulder", 0.5}, {"elbow", -0.3}}`. Each holds what it was
+  /// commanded until its next command; no watchdog ends that.
+  /// @param values rad or m, rad/s or m/s, N m or N; positions are kept within the joint's limits
+  /// @param mode what they are
+  /// @throws UnknownName, which lists the joints; std::invalid_argument for what is not finite;
+  /// NotSupported for a joint that takes no commands, and in lockstep; NoServer
+  void command_joints(const std::map<std::string, double>& values,
+                      JointMode mode = JointMode::position) const;
 
   /// Drives within the robot's limits until the next command of any kind: the command is repeated
   /// in the background, so that the watchdog does not stop the robot.
@@ -490,6 +704,11 @@ class Robot {
   /// @param right rad/s, positive ahead
   /// @return the command
   [[nodiscard]] Command wheel_command(double left, double right) const;
+  /// @param values as command_joints() takes them
+  /// @param mode what they are
+  /// @return the command
+  [[nodiscard]] Command joint_command(const std::map<std::string, double>& values,
+                                      JointMode mode = JointMode::position) const;
   /// @param kind a primitive
   /// @param value m or rad; of a stop 0
   /// @param limits as of the primitive
@@ -518,6 +737,40 @@ enum class Reset {
   all,   ///< what follows equals a fresh run
   time,  ///< sim time starts at 0 again; nothing moves
   poses  ///< everything back to where it started, at rest; sim time goes on
+};
+
+/// How something moves, in the world.
+struct Twist {
+  Vector3 linear{};   ///< m/s
+  Vector3 angular{};  ///< rad/s
+};
+
+/// A model, or a part of it, from Simulation::body(). Each call asks the server, and throws what a
+/// request does. Copies are the same body.
+class Body : public BodyInfo {
+ public:
+  /// @cond
+  Body(std::shared_ptr<Core> core, BodyInfo info)
+      : BodyInfo(std::move(info)), core_(std::move(core)) {}
+  /// @endcond
+  [[nodiscard]] Transform pose() const;  ///< @return in the world, as it is now
+  [[nodiscard]] Twist twist() const;     ///< @return as it moves now
+  /// Puts the model somewhere, at rest.
+  /// @param pose in the world
+  void set_pose(const Transform& pose) const;
+  /// The same on the ground.
+  /// @param x m, world
+  /// @param y m, world
+  /// @param heading rad
+  /// @param z m, world
+  void set_pose(double x, double y, double heading = 0.0, double z = 0.0) const {
+    set_pose(Transform::of(x, y, heading, z));
+  }
+  /// @param twist that the model gets
+  void set_twist(const Twist& twist) const;
+
+ private:
+  std::shared_ptr<Core> core_;
 };
 
 /// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step()
@@ -550,9 +803,32 @@ class [[nodiscard]] Simulation : public Requests {
   /// @return the robot
   /// @throws UnknownName, which lists those that exist; NoServer
   [[nodiscard]] Robot robot(const std::string& name) const;
+  /// @param name of a model ("crate"), or of a part of it ("crate/lid")
+  /// @return its pose, its twist, and putting it elsewhere
+  /// @throws UnknownName, which lists the models; NoServer
+  [[nodiscard]] Body body(const std::string& name) const;
   /// @param time of sim time
   /// @throws NoServer
   void sleep(Duration time) const;
+  /// A loop at a period of sim time: `for (double t : sim.every(0.1))` goes on at each multiple of
+  /// it, with the time (s) of that moment, and leaves out those that have passed while the loop's
+  /// body ran. Ends with the run.
+  /// @param period of sim time, above 0
+  /// @return the loop's range
+  /// @throws std::invalid_argument; NotSupported in lockstep; NoServer
+  [[nodiscard]] Every every(Duration period) const;
+  /// Streams joined by stamp: `for (const auto& [scan, pose] :
+  /// sim.synchronised(robot.lrf(), robot.pose()))` has, with each sample of the first stream, what
+  /// Stream::at() of the others gives for its time. Ends with the run.
+  /// @param first paces the loop
+  /// @param others are joined to it
+  /// @return the loop's range
+  /// @throws TypeMismatch, NoServer
+  template <class First, class... Others>
+  [[nodiscard]] Synchronised<First, Others...> synchronised(const Stream<First>& first,
+                                                            const Stream<Others>&... others) const {
+    return {first, others...};
+  }
   /// Calls back, in the thread of the callbacks, when another server, or the same one restarted,
   /// answers at this address. Commands are not repeated into the new run, and primitives under way
   /// have ended.

@@ -29,6 +29,36 @@ inline constexpr double kFast =
 using Vector3 = std::array<double, 3>;     ///< x, y, z
 using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 
+/// @param angle rad
+/// @return the equal one in [-pi, pi)
+[[nodiscard]] double normalize_angle(double angle);
+
+/// The pose of a frame B in a frame A: takes points of B to A. Products compose: if a is B in A and
+/// b is C in B, a * b is C in A.
+struct Transform {
+  Vector3 position{};                     ///< m
+  Quaternion orientation{1.0, 0.0, 0.0, 0.0};  ///< a unit quaternion w, x, y, z
+
+  /// @param x m
+  /// @param y m
+  /// @param heading rad, counter-clockwise from the x axis
+  /// @param z m
+  /// @return a pose on the ground
+  static Transform of(double x, double y, double heading = 0.0, double z = 0.0);
+  double x() const { return position[0]; }  ///< @return m
+  double y() const { return position[1]; }  ///< @return m
+  double z() const { return position[2]; }  ///< @return m
+  /// @return rad, counter-clockwise from A's x axis, in (-pi, pi]
+  [[nodiscard]] double heading() const;
+  [[nodiscard]] Transform inverse() const;  ///< @return A in B
+  /// @param other C in B
+  /// @return C in A
+  [[nodiscard]] Transform operator*(const Transform& other) const;
+  /// @param point of B, m
+  /// @return it in A, m
+  [[nodiscard]] Vector3 apply(const Vector3& point) const;
+};
+
 /// What all samples have.
 struct Sample {
   int64_t utime = 0;  ///< us, sim time of the state shown

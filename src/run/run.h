@@ -209,6 +209,7 @@ class Run {
   Outcome say_info(const request_t&);
   Outcome quit(const request_t&);
   Outcome reset_odometry(const request_t& request, const name_request_t& body);
+  Outcome get_joint_limits(const request_t&, const name_request_t& body);
   Outcome snapshot(const request_t& request);
   Outcome snapshot_of(const snapshot_request_t& past);
   Outcome restore(const request_t& request, const name_request_t& body);

@@ -169,7 +169,7 @@ def test_the_client_for_python_has_the_method(tree):
 
         class Session:
             def request(self, kind, body=None, timeout=5.0):
-                assert kind == lcmtypes.request_t.GET_GRAVITY == 21 and body is None
+                assert kind == lcmtypes.request_t.GET_GRAVITY == 22 and body is None
                 reply = lcmtypes.gravity_reply_t()
                 reply.gravity = [0.0, 0.5, -9.5]
                 return types.SimpleNamespace(body=reply.encode())

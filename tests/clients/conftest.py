@@ -42,6 +42,13 @@ if "RUEDO_PROBE_JAVA" in os.environ:
         "Probe",
     ]
 
+# The probes of tests/clients/api_test.py.
+APIS = {"python": [sys.executable, str(HERE / "probe/api.py")]}
+if "RUEDO_API_CPP" in os.environ:
+    APIS["cpp"] = [os.environ["RUEDO_API_CPP"]]
+if "java" in PROBES:
+    APIS["java"] = [*PROBES["java"][:-1], "Api"]
+
 CLIENT = os.environ.get("RUEDO_CLIENT", "")  # the language that is tested; "": each
 # In these the one alone that this says, where it says one.
 LONG = ("behind_test", "endings_test", "hostile_test", "rivals_test")

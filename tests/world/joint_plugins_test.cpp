@@ -344,12 +344,18 @@ TEST(RosGains, OfAJointsOwnParameters) {
   EXPECT_EQ(axis(*world, 0).position_pid.value().i_max, 5.0);
 }
 
-// As in gazebo_ros_control and gz_ros2_control: arms do not fall before the first command.
-TEST(RosGains, JointsByPositionOrVelocityStayWhereTheyBegin) {
+// Arms do not fall before the first command, whatever the interface of their drives is.
+TEST(RosGains, JointsWithATransmissionStayWhereTheyBegin) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(
       "bot.urdf", bot(transmission("one", "Position") + transmission("two", "Effort"))));
   EXPECT_EQ(axis(*world, 0).start.mode, JointStart::Mode::stay);
+  EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::stay);
+}
+
+TEST(RosGains, JointsThatNothingDrivesAreFree) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", bot(transmission("one", "Position"))));
   EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::free);
 }
 

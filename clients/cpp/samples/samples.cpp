@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 
+#include "joint.h"
 #include "samples/sample_types.h"
 
 namespace ruedo::client {
@@ -16,6 +17,82 @@ double Scan::nearest(double from_angle, double to_angle) const {
       nearest = std::min(nearest, static_cast<double>(ranges[i]));
   }
   return nearest;
+}
+
+size_t Joints::index(const std::string& joint) const { return index_of(names, joint, "there is"); }
+
+double Joints::position(const std::string& joint) const { return positions.at(index(joint)); }
+
+double Joints::velocity(const std::string& joint) const { return velocities.at(index(joint)); }
+
+double Joints::effort(const std::string& joint) const { return efforts.at(index(joint)); }
+
+namespace {
+
+double mixed(double first, double second, double share) {
+  return (1.0 - share) * first + share * second;
+}
+
+template <class Numbers>
+Numbers mixed(const Numbers& first, const Numbers& second, double share) {
+  Numbers made = first;
+  for (size_t i = 0; i < made.size() && i < second.size(); ++i) {
+    made[i] = static_cast<typename Numbers::value_type>(
+        mixed(static_cast<double>(first[i]), static_cast<double>(second[i]), share));
+  }
+  return made;
+}
+
+// The linear way between unit quaternions, normalised: for the small angles between two samples it
+// is the shortest.
+Quaternion turned(const Quaternion& first, Quaternion second, double share) {
+  double dot = 0.0, norm = 0.0;
+  for (size_t i = 0; i < 4; ++i) dot += first[i] * second[i];
+  for (double& one : second) one = dot < 0.0 ? -one : one;
+  Quaternion made = mixed(first, second, share);
+  for (const double one : made) norm += one * one;
+  for (double& one : made) one /= std::sqrt(norm);
+  return made;
+}
+
+double share_of(const Sample& first, const Sample& second, int64_t at) {
+  return static_cast<double>(at - first.utime) / static_cast<double>(second.utime - first.utime);
+}
+
+}  // namespace
+
+std::vector<Vector3> Scan::points(const Transform& device) const {
+  std::vector<Vector3> points;
+  for (size_t i = 0; i < ranges.size(); ++i) {
+    const double range = static_cast<double>(ranges[i]);
+    if (std::isfinite(range))
+      points.push_back(
+          device.apply({range * std::cos(angle(i)), range * std::sin(angle(i)), 0.0}));
+  }
+  return points;
+}
+
+Odometry Odometry::interpolated(const Odometry& later, int64_t at) const {
+  const double share = share_of(*this, later, at);
+  Odometry made = *this;
+  made.utime = at;
+  for (double Odometry::*field :
+       {&Odometry::x, &Odometry::y, &Odometry::theta, &Odometry::v, &Odometry::omega})
+    made.*field = mixed(this->*field, later.*field, share);
+  made.wheel_angles = mixed(wheel_angles, later.wheel_angles, share);
+  made.wheel_rates = mixed(wheel_rates, later.wheel_rates, share);
+  return made;
+}
+
+Pose Pose::interpolated(const Pose& later, int64_t at) const {
+  const double share = share_of(*this, later, at);
+  Pose made = *this;
+  made.utime = at;
+  made.orientation = turned(orientation, later.orientation, share);
+  for (Vector3 Pose::*field :
+       {&Pose::position, &Pose::velocity, &Pose::rotation_rate, &Pose::acceleration})
+    made.*field = mixed(this->*field, later.*field, share);
+  return made;
 }
 
 double Pose::heading() const {

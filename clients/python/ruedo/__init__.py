@@ -33,6 +33,7 @@ except ImportError as _error:
 _HAS_NUMPY = find_spec("numpy") is not None  # programs of plain LCM need the message types alone
 if TYPE_CHECKING or _HAS_NUMPY:
     from . import markers, samples, vocabulary
+    from .bodies import Body, Twist
     from .callbacks import Subscription
     from .errors import (
         LaunchError,
@@ -47,6 +48,8 @@ if TYPE_CHECKING or _HAS_NUMPY:
         TypeMismatch,
         UnknownName,
     )
+    from .geometry import Transform, normalize_angle
+    from .joints import Joint, JointStream
     from .launch import find_ruedo, launch
     from .lockstep import Command, Message, Observations
     from .logs import Log, LogChannel, open_log, read_log
@@ -59,7 +62,6 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .values import Sample
     from .vocabulary import *  # noqa: F403
     from .world import World
-    from .world_info import Body
 else:
     samples = vocabulary = SimpleNamespace(__all__=[])
 
@@ -87,6 +89,8 @@ __all__ = [
     "Camera",
     "Command",
     "Device",
+    "Joint",
+    "JointStream",
     "LaunchError",
     "LeaseLost",
     "Log",
@@ -108,6 +112,8 @@ __all__ = [
     "Stream",
     "Subscription",
     "Timeout",
+    "Transform",
+    "Twist",
     "TypeMismatch",
     "UnknownName",
     "World",
@@ -117,6 +123,7 @@ __all__ = [
     "lcmtypes",
     "load_map",
     "markers",
+    "normalize_angle",
     "open_log",
     "read_log",
 ]

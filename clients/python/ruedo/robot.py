@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -14,7 +14,9 @@ import numpy as np
 from . import lcmtypes
 from .arguments import check_callback, finite, number, numbers, shown, text
 from .errors import NotSupported, UnknownName
-from .geometry import Floats
+from .geometry import Floats, Transform
+from .joints import JointStream, limits_of
+from .joints import message as joint_message
 from .lockstep import Command
 from .motion import Driver, Motion
 from .samples import (
@@ -23,7 +25,6 @@ from .samples import (
     Contact,
     Image,
     Imu,
-    Joints,
     LidarScan,
     MotionStatus,
     Odometry,
@@ -33,6 +34,7 @@ from .samples import (
     SonarReading,
 )
 from .stream import RAW, Form, Stream, form_of
+from .vocabulary import JointMode
 
 if TYPE_CHECKING:
     from .callbacks import Subscription
@@ -69,6 +71,11 @@ class Device(Stream[T]):
         self.width: int = info.width
         self.height: int = info.height
         self.elements: Floats = np.array(info.element_pose, np.float64).reshape(info.nelements, 6)
+
+    @property
+    def transform(self) -> Transform:
+        """Its frame in base_link at the start."""
+        return Transform(self.position, self.orientation)
 
 
 class Camera(Device[Image]):
@@ -245,8 +252,11 @@ class Robot:
         return self._stream("motion_status_t", "motion status")
 
     @property
-    def joints(self) -> Stream[Joints]:
-        return self._stream("joint_state_t", "joints")
+    def joints(self) -> JointStream:
+        """The states of its joints, and each of them by its name: ``robot.joints["elbow"]``."""
+        stream = self._stream("joint_state_t", "joints")
+        assert isinstance(stream, JointStream)
+        return stream
 
     # Driving.
 
@@ -280,6 +290,31 @@ class Robot:
                 f"vy is {vy} m/s, but {self.name} cannot move sideways: its drive is {self.drive!r}"
             )
         return Command(channel, data)
+
+    def command_joints(
+        self, values: Mapping[str, float], mode: JointMode | str = "position"
+    ) -> None:
+        """Commands joints by their names: ``{"shoulder": 0.5, "elbow": -0.3}``. Each holds what it
+        was commanded until its next command; no watchdog ends that.
+
+        mode: "position" (rad or m), "velocity" (rad/s or m/s), "effort" (N m or N), or another of
+        JointMode. Positions are kept within the joint's limits. Raises UnknownName, which lists the
+        joints, NotSupported for a joint that takes no commands, and in lockstep.
+        """
+        self._connection.check_open()
+        self._check_acts_at_once("joint_command({...})")
+        command = self.joint_command(values, mode)
+        self._connection.bus.publish(command.channel, command.data)
+
+    def joint_command(
+        self, values: Mapping[str, float], mode: JointMode | str = "position"
+    ) -> Command:
+        """What command_joints() sends, for Simulation.step()."""
+        channel = self._input("joint_command_t", "it has no joints")
+        limits = limits_of(self._connection, self.name)
+        command = joint_message(self.name, limits, values, mode)
+        command.utime = self._connection.clock.utime
+        return Command(channel, command.encode())
 
     def wheel_command(self, left: float, right: float) -> Command:
         """What set_wheels() sends, once, for Simulation.step()."""
@@ -482,13 +517,13 @@ class Robot:
     def _channels(self) -> list[Any]:
         return self._connection.info.channels.get(self.name, [])
 
-    def _input(self, type: str) -> str:
+    def _input(self, type: str, lack: str = "") -> str:
         known = self._connection.info
         if self._inputs_of is not known:
             self._inputs_now, self._inputs_of = {}, known
         channel = self._inputs_now.get(type)
         if channel is None:
-            channel = self._inputs_now[type] = self._find_input(type)
+            channel = self._inputs_now[type] = self._find_input(type, lack)
         return channel
 
     def _driver(self, in_steps: str) -> Driver:
@@ -506,10 +541,12 @@ class Robot:
                 f"sim.step(n, [robot.{in_steps}])"
             )
 
-    def _find_input(self, type: str) -> str:
+    def _find_input(self, type: str, lack: str) -> str:
         for channel in self._channels:
             if channel.input and channel.type == type:
                 return str(channel.name)
+        if lack:
+            raise NotSupported(f"{self.name} takes no {type}: {lack}")
         if not self.drive:
             raise NotSupported(
                 f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints"
@@ -545,14 +582,18 @@ class Robot:
         raise UnknownName(f"{self.name} publishes no {what}")
 
     def _plain(self, channel: Any, form: Form | None = None) -> Stream[Any]:
-        return _plain(self._connection, channel, form)
+        stream = _plain(self._connection, channel, form)
+        if isinstance(stream, JointStream):
+            stream.robot = self
+        return stream
 
 
 def _plain(connection: Connection, channel: Any, form: Form | None = None) -> Stream[Any]:
     """A stream that belongs to no device."""
+    made = JointStream if channel.type == "joint_state_t" and form is None else Stream
     return connection.streams.get(
         channel,
-        lambda: Stream(
+        lambda: made(
             connection, channel.name, channel.type, channel.fingerprint, channel.rate, form
         ),
         form,

@@ -5,18 +5,20 @@ from proto/vocabulary.toml.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import notebook
-from .errors import NotSupported
-from .geometry import Floats, Placed, transformed
+from .arguments import shown
+from .errors import NotSupported, UnknownName
+from .geometry import Floats, Placed, Transform, between, transformed
 
 if TYPE_CHECKING:
-    from .samples import ContactPoint
+    from .samples import ContactPoint, Odometry, Pose
 
 
 class ScanMethods:
@@ -63,6 +65,9 @@ class ScanMethods:
 
 
 class OdometryMethods:
+    utime: int
+    x: float
+    y: float
     theta: float
 
     @property
@@ -72,10 +77,40 @@ class OdometryMethods:
         """
         return math.remainder(self.theta, math.tau)
 
+    @property
+    def transform(self) -> Transform:
+        """base_link in odom."""
+        return Transform.of(self.x, self.y, self.theta)
+
+    def interpolated(self, later: Odometry, utime: int) -> Odometry:
+        """Between this one and a later one, at utime (us)."""
+        share = (utime - self.utime) / (later.utime - self.utime)
+        values = {
+            name: (1.0 - share) * getattr(self, name) + share * getattr(later, name)
+            for name in ("x", "y", "theta", "v", "omega", "wheel_angles", "wheel_rates")
+        }
+        return replace(cast("Odometry", self), utime=utime, **values)
+
 
 class PoseMethods:
+    utime: int
     position: Floats
     orientation: Floats
+
+    @property
+    def transform(self) -> Transform:
+        """base_link in the world."""
+        return Transform(self.position, self.orientation)
+
+    def interpolated(self, later: Pose, utime: int) -> Pose:
+        """Between this one and a later one, at utime (us)."""
+        share = (utime - self.utime) / (later.utime - self.utime)
+        values = {
+            name: (1.0 - share) * getattr(self, name) + share * getattr(later, name)
+            for name in ("position", "velocity", "rotation_rate", "acceleration")
+        }
+        turned = between(self.orientation, later.orientation, share)
+        return replace(cast("Pose", self), utime=utime, orientation=turned, **values)
 
     @property
     def x(self) -> float:
@@ -166,6 +201,33 @@ class ImageMethods:
             head = "P5" if self.format == "gray" else "P6"
             content = f"{head} {self.width} {self.height} 255\n".encode() + self.array().tobytes()
         Path(path).write_bytes(content)
+
+
+class JointsMethods:
+    names: list[str]
+    positions: Floats
+    velocities: Floats
+    efforts: Floats
+
+    def index(self, name: str) -> int:
+        """Where a joint is in the arrays. Raises UnknownName, which lists the joints."""
+        if name not in self.names:
+            raise UnknownName(
+                f"there is no joint {shown(name)}; there is {', '.join(self.names) or 'none'}"
+            )
+        return self.names.index(name)
+
+    def position(self, name: str) -> float:
+        """Of a joint, rad or m. Raises UnknownName."""
+        return float(self.positions[self.index(name)])
+
+    def velocity(self, name: str) -> float:
+        """Of a joint, rad/s or m/s. Raises UnknownName."""
+        return float(self.velocities[self.index(name)])
+
+    def effort(self, name: str) -> float:
+        """Of a joint's motor, N m or N. Raises UnknownName."""
+        return float(self.efforts[self.index(name)])
 
 
 class CollisionsMethods:

@@ -7,15 +7,18 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
 
 from . import arguments, lcmtypes
+from .bodies import Body, found
 from .callbacks import Subscription
 from .errors import NotSupported, RunEnded
+from .in_step import Every, synchronised
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
 from .requests import Requests
@@ -23,9 +26,14 @@ from .robot import Robot
 from .samples import State
 from .session import control
 from .session.connection import Connection, PrivateServer
+from .stream import Stream
 from .transport.address import resolve_url
 from .transport.transport import Transport
-from .world_info import Body, WorldInfo
+from .world_info import WorldInfo
+
+A = TypeVar("A")
+B = TypeVar("B")
+C = TypeVar("C")
 
 
 def connect(url: str | None = None, *, name: str | None = None, timeout: float = 2.0) -> Simulation:
@@ -108,7 +116,13 @@ class Simulation(Requests):
     @property
     def bodies(self) -> list[Body]:
         """All bodies that there are."""
-        return list(self._info.bodies)
+        return [replace(body, _simulation=self) for body in self._info.bodies]
+
+    def body(self, name: str) -> Body:
+        """A model ("crate"), or a part of it ("crate/lid"): its pose, its twist, and putting it
+        elsewhere. UnknownName lists the models.
+        """
+        return found(self._info.bodies, arguments.text("name", name), self)
 
     def robot(self, name: str) -> Robot:
         """The robot of that name; UnknownName lists those that exist."""
@@ -132,6 +146,37 @@ class Simulation(Requests):
         time, and says why. Raises RunEnded."""
         self._connection.check_open()
         self._connection.sleep(round(arguments.finite("seconds", seconds) * 1e6))
+
+    def every(self, period: float) -> Every:
+        """A loop at a period of sim time (s): ``for t in sim.every(0.1)`` goes on at each multiple
+        of it, with the time (s) of that moment, and leaves out those that have passed while the
+        loop's body ran. Ends with the run. ``async for`` takes it, too."""
+        microseconds = round(arguments.finite("period", period) * 1e6)
+        if microseconds < 1:
+            raise ValueError(f"period is {period}: it must be a number of seconds above 0")
+        return Every(self._connection, microseconds)
+
+    @overload
+    def synchronised(self, first: Stream[A], second: Stream[B], /) -> Iterator[tuple[A, B]]: ...
+
+    @overload
+    def synchronised(
+        self, first: Stream[A], second: Stream[B], third: Stream[C], /
+    ) -> Iterator[tuple[A, B, C]]: ...
+
+    @overload
+    def synchronised(
+        self, first: Stream[Any], /, *others: Stream[Any]
+    ) -> Iterator[tuple[Any, ...]]: ...
+
+    def synchronised(
+        self, first: Stream[Any], /, *others: Stream[Any]
+    ) -> Iterator[tuple[Any, ...]]:
+        """Streams joined by stamp: ``for scan, pose in sim.synchronised(robot.lrf, robot.pose)``
+        has, with each sample of the first stream, what Stream.at() of the others gives for its
+        time. A loop slower than the stream gets the newest sample each time. Ends with the run.
+        """
+        return synchronised(first, others)
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.

@@ -6,17 +6,21 @@ the thread of the callbacks.
 
 from __future__ import annotations
 
+import bisect
+import contextlib
+import math
 import struct
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterator
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from . import samples
-from .arguments import shown
+from .arguments import shown, whole
 from .callbacks import Callbacks, Subscription
 from .decoding import decode
-from .errors import RuedoError, Timeout, TypeMismatch
+from .errors import RuedoError, RunEnded, Timeout, TypeMismatch
 from .fast_decoding import DECODERS
 
 if TYPE_CHECKING:
@@ -28,6 +32,8 @@ T = TypeVar("T")
 _UTIME = struct.Struct(">q")
 _UTIME_AT = 8  # behind the fingerprint, in all of the server's own types
 _MOST_LOST = 1_000_000_000  # in one gap: a false time may make it any
+_LOOK_SECONDS = 0.5  # for the server, while nothing comes
+_MOST_KEPT, _MOST_KEPT_BYTES = 256, 4 << 20  # of what came before, for at()
 _MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps tell no more than that
 
 
@@ -80,6 +86,38 @@ class Reader(Generic[T]):
         none."""
         return self._stream._sample_for(self, True, timeout)
 
+    def __iter__(self) -> Iterator[T]:
+        """What next() returns, again and again: ``for scan in robot.lrf``. Ends with the run."""
+        while True:
+            try:
+                sample = self.next(math.inf)
+            except RunEnded:
+                return
+            yield sample
+
+    async def __aiter__(self) -> AsyncIterator[T]:
+        """The same for asyncio: ``async for scan in robot.lrf``, beside the loop's other tasks."""
+        import asyncio
+
+        loop, woken = asyncio.get_running_loop(), asyncio.Event()
+
+        def wake(_: T) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(woken.set)
+
+        with self._stream.on_arrival(wake):
+            while True:
+                woken.clear()
+                try:
+                    arrival = self._stream._poll(self)
+                except RunEnded:
+                    return
+                if arrival:
+                    yield arrival.sample()
+                else:
+                    with contextlib.suppress(asyncio.TimeoutError):
+                        await asyncio.wait_for(woken.wait(), _LOOK_SECONDS)
+
 
 class _Arrival:
     """A message of a stream."""
@@ -131,6 +169,8 @@ class Stream(Reader[T]):
         self._news = threading.Condition()
         self._source: Subscription | None = None
         self._newest: _Arrival | None = None
+        self._kept: deque[_Arrival] = deque()  # the newest last
+        self._kept_bytes = 0
         self._count = 0  # samples that came or were lost
         self._last_utime: int | None = None  # us
         self._waiting: list[int] = []  # threads that wait for a sample
@@ -168,6 +208,76 @@ class Stream(Reader[T]):
         """The same in the receiving thread, for what is this package's own."""
         self._subscribe()
         return self._arrivals.add(callback)
+
+    def at(self, utime: int, timeout: float = 5.0) -> T:
+        """The sample of a moment, utime (us of sim time, such as ``scan.utime``): waits until the
+        stream has come so far. Where no sample is of that moment, a pose or odometry is
+        interpolated between its neighbours, and of other streams it is the nearest.
+
+        A stream keeps its last 256 samples, of 4 MB at most, from its first use on: for an earlier
+        moment Timeout is raised. `Simulation.synchronised()` joins streams from the beginning.
+        """
+        sample = self._at(whole("utime", utime), timeout)
+        if sample is None:
+            first = self._kept[0].utime or 0 if self._kept else 0
+            raise Timeout(
+                f"{self.channel} has no sample of {utime * 1e-6:g} s: those that it has kept, from "
+                f"its first use on, begin at {first * 1e-6:g} s. Use it before, or sim.synchronised()"
+            )
+        return sample
+
+    def _at(self, utime: int, timeout: float) -> T | None:
+        """None: it is of before what is kept."""
+        if not self._has_utime:
+            raise TypeError(f"{self.channel} carries {self.type}, whose messages have no time")
+        self._subscribe()
+        self._connection.note_use()
+        self._connection.bus.catch_up()
+        with self._news:
+            self._await(lambda: bool(self._kept) and (self._kept[-1].utime or 0) >= utime, timeout)
+            times = [arrival.utime or 0 for arrival in self._kept]
+            after = bisect.bisect_left(times, utime)
+            if times[after] != utime and after == 0:
+                return None
+            pair = [self._kept[max(after - 1, 0)], self._kept[after]]
+        self._connection.note_use()
+        before, behind = (arrival.sample() for arrival in pair)
+        if times[after] == utime:
+            return behind
+        if hasattr(before, "interpolated"):
+            between: T = before.interpolated(behind, utime)
+            return between
+        return before if utime - times[after - 1] < times[after] - utime else behind
+
+    def _poll(self, reader: Reader[T]) -> _Arrival | None:
+        """What next() would return, or None: then the caller's thread waits for it. Raises what
+        next() does."""
+        connection = self._connection
+        connection.check_open()
+        connection.bus.catch_up()
+        not_before, me = connection.not_before(), threading.get_ident()
+        with self._news:
+            self._raise_fault()
+            if self._serves(reader, True, not_before):
+                return self._taken(reader)
+            connection.progress.wait()
+            if me not in self._waiting:
+                self._waiting.append(me)
+        connection.check_server()
+        return None
+
+    def _raise_fault(self) -> None:
+        if self._fault:
+            fault, self._fault = self._fault, None
+            raise fault
+
+    def _taken(self, reader: Reader[T]) -> _Arrival:
+        """The newest one. With the lock held."""
+        assert self._newest is not None
+        if reader._seen:
+            reader._skipped += max(0, self._count - reader._seen - 1)
+        reader._seen = self._count
+        return self._newest
 
     def _subscribe(self) -> None:
         self._connection.check_open()
@@ -223,6 +333,8 @@ class Stream(Reader[T]):
         """What came is of a run that has ended."""
         with self._news:
             self._newest = self._fault = self._last_utime = None
+            self._kept.clear()
+            self._kept_bytes = 0
 
     def _fail(self, error: RuedoError) -> None:
         """Whatever came, the receiving thread lives."""
@@ -264,6 +376,7 @@ class Stream(Reader[T]):
             connection.clock.note(utime)
         with self._news:
             self._newest, self._fault = arrival, None
+            self._keep(arrival)
             self._count += 1 + self._lost_before(utime)
             if self._waiting:
                 connection.progress.use(connection.clock.utime, tuple(self._waiting))
@@ -273,6 +386,18 @@ class Stream(Reader[T]):
         if self._callbacks:
             for stream in connection.callbacks.put(arrival.call_back, self, len(data)):
                 stream._missed += 1
+
+    def _keep(self, arrival: _Arrival) -> None:
+        """For at(). With the lock held."""
+        if arrival.utime is None:
+            return
+        if self._kept and arrival.utime < (self._kept[-1].utime or 0):  # sim time was reset
+            self._kept.clear()
+            self._kept_bytes = 0
+        self._kept.append(arrival)
+        self._kept_bytes += len(arrival.data)
+        while len(self._kept) > _MOST_KEPT or self._kept_bytes > _MOST_KEPT_BYTES:
+            self._kept_bytes -= len(self._kept.popleft().data)
 
     def _lost_before(self, utime: int | None) -> int:
         """How many samples are missing since the last one."""
@@ -293,13 +418,8 @@ class Stream(Reader[T]):
         connection.bus.catch_up()
         not_before = connection.not_before() if a_new_one else None
         with self._news:
-            arrival = self._newest
-            if not self._serves(reader, a_new_one, not_before):
-                arrival = self._await(reader, a_new_one, not_before, timeout)
-            assert arrival is not None
-            if reader._seen:
-                reader._skipped += max(0, self._count - reader._seen - 1)
-            reader._seen = self._count
+            self._await(lambda: self._serves(reader, a_new_one, not_before), timeout)
+            arrival = self._taken(reader)
         connection.note_use()
         try:
             sample: T = arrival.sample()
@@ -319,19 +439,17 @@ class Stream(Reader[T]):
             return False
         return not_before is None or newest.utime is None or newest.utime >= not_before
 
-    def _await(
-        self, reader: Reader[T], a_new_one: bool, not_before: int | None, timeout: float
-    ) -> _Arrival | None:
+    def _await(self, ready: Callable[[], bool], timeout: float) -> None:
         """With the lock held."""
+        if ready():
+            return
         deadline, me = time.monotonic() + timeout, threading.get_ident()
         try:
-            while not self._serves(reader, a_new_one, not_before):
+            while not ready():
                 if me not in self._waiting:  # what came meanwhile was not what is wanted
                     self._connection.progress.wait()
                     self._waiting.append(me)
-                if self._fault:
-                    fault, self._fault = self._fault, None
-                    raise fault
+                self._raise_fault()
                 self._connection.check_may_wait()
                 left = deadline - time.monotonic()
                 if left <= 0.0:
@@ -340,9 +458,8 @@ class Stream(Reader[T]):
                     )
                 self._news.wait(min(left, 0.5))
                 self._connection.check_open()
-                if not self._serves(reader, a_new_one, not_before):  # else the run may have ended
+                if not ready():  # else the run may have ended
                     self._connection.check_server()
-            return self._newest
         finally:
             if me in self._waiting:
                 self._waiting.remove(me)

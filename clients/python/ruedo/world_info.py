@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import struct
 from collections import defaultdict
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
+from .bodies import Body
 from .decoding import decode
 from .errors import CONTROL, TypeMismatch
 
+if TYPE_CHECKING:
+    from .samples import JointLimits
+
 _HEAD = struct.Struct(">qqqihh")  # fingerprint, utime, run_id, epoch, part, nparts
 _MOST_PARTS, _MOST_BYTES = 1024, 64 << 20  # of an info
-
-
-@dataclass(frozen=True)
-class Body:
-    """A set of links that do not move against each other, as ruedo/info lists it."""
-
-    name: str  # MODEL/LINK: what Simulation.state() takes
-    is_static: bool  # it never moves
-    mass: float  # kg; 0 of what never moves
 
 
 class WorldInfo:
@@ -38,6 +32,7 @@ class WorldInfo:
         self.step_us: int = head.step_us
         self.features: int = head.features
         self.paused: bool = head.paused
+        self.joint_limits: dict[str, JointLimits] = {}  # of the robots that were asked for
         self.robots: dict[str, Any] = {r.name: r for p in parts for r in p.robots}
         self.devices: dict[str, list[Any]] = defaultdict(list)  # by robot
         self.channels: dict[str, list[Any]] = defaultdict(list)  # by robot

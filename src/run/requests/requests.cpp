@@ -2,10 +2,13 @@
 // are in edit_requests.cpp, those of snapshots in snapshot_requests.cpp.
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 #include <fmt/format.h>
 
 #include "engine/world_state.h"
+#include "robot/joint_control.h"
+#include "ruedo/joint_limits_t.hpp"
 #include "run/requests/request_table.h"
 #include "run/run.h"
 
@@ -62,6 +65,8 @@ constexpr RequestKind RequestTable::kKinds[] = {
      plain<&Run::quit>},
     {"RESET_ODOMETRY", request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers,
      RequestKind::for_state, with<name_request_t, &Run::reset_odometry>},
+    {"GET_JOINT_LIMITS", request_t::GET_JOINT_LIMITS, RequestKind::nothing, RequestKind::looks,
+     RequestKind::for_state, with<name_request_t, &Run::get_joint_limits>},
     {"RESET", request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
      with<reset_request_t, &Run::reset>},
     {"SPAWN", request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
@@ -268,6 +273,52 @@ Outcome Run::reset_odometry(const request_t& request, const name_request_t& body
     if (world_->models[layout.robots[robot].instance].name != body.name) continue;
     simulation_->inbox().reset_odometry(robot, request.body);
     return {};
+  }
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
+}
+
+namespace {
+
+const char* kind_of(world::JointType type) {
+  switch (type) {
+    case world::JointType::fixed: return "fixed";
+    case world::JointType::revolute: return "revolute";
+    case world::JointType::continuous: return "continuous";
+    case world::JointType::prismatic: return "prismatic";
+    case world::JointType::ball: return "ball";
+    case world::JointType::universal: return "universal";
+    case world::JointType::screw: return "screw";
+    case world::JointType::gearbox: return "gearbox";
+  }
+  return "";
+}
+
+void add(const world::Joint& joint, joint_limits_t& reply) {
+  const world::JointAxis& axis = joint.axis;
+  const bool limited = axis.lower <= axis.upper;
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  ++reply.n;
+  reply.name.push_back(joint.name);
+  reply.kind.emplace_back(kind_of(joint.type));
+  reply.takes_commands.push_back(robot::takes_commands(joint));
+  reply.holds.push_back(axis.start.mode != world::JointStart::Mode::free);
+  reply.lower.push_back(limited ? axis.lower : -kNone);
+  reply.upper.push_back(limited ? axis.upper : kNone);
+  reply.velocity.push_back(axis.velocity);
+  reply.effort.push_back(axis.effort);
+}
+
+}  // namespace
+
+Outcome Run::get_joint_limits(const request_t&, const name_request_t& body) {
+  const world::BodyLayout& layout = simulation_->layout();
+  for (const world::RobotPlacement& robot : layout.robots) {
+    const world::ModelInstance& instance = world_->models[robot.instance];
+    if (instance.removed || instance.name != body.name) continue;
+    joint_limits_t reply{};
+    for (const JointIndex joint : robot.joints)
+      add(instance.model->joints[layout.joints[joint].joint], reply);
+    return Outcome::with(engine::encoded(reply));
   }
   return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
 }

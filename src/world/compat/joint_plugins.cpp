@@ -99,7 +99,8 @@ struct Reader {
     else if (drive && (is_among(drive->left_joints) || is_among(drive->right_joints) ||
                        is_among(drive->steer_joints)))
       why = "is turned by the drive";
-    else if (held.axis.start.mode != JointStart::Mode::free)
+    else if (held.axis.start.mode != JointStart::Mode::free &&
+             held.axis.start.mode != JointStart::Mode::stay)
       why = "has another controller already; this one counts where they differ";
     if (!why.empty())
       findings.unsupported(at.source, where,
@@ -244,22 +245,12 @@ void read_joint_interfaces(const Element& model_element, const std::string& wher
     else if (stays && joint->axis.start.mode == JointStart::Mode::free)
       joint->axis.start.mode = JointStart::Mode::stay;
   };
-  const auto holds = [](const std::string& interface) {
-    return interface.find("osition") != std::string::npos ||
-           interface.find("elocity") != std::string::npos;
-  };
   for (const Element* transmission : model_element.all("transmission")) {
-    for (const Element* joint : transmission->all("joint"))
-      read(*joint, holds(joint->string("hardwareInterface", "")));
+    for (const Element* joint : transmission->all("joint")) read(*joint, true);
   }
   for (const Element* system : model_element.all("ros2_control")) {
-    for (const Element* joint : system->all("joint")) {
-      const auto interfaces = joint->all("command_interface");
-      read(*joint, std::any_of(interfaces.begin(), interfaces.end(), [&](const Element* each) {
-        const std::string* name = each->attribute("name");
-        return name && holds(*name);
-      }));
-    }
+    for (const Element* joint : system->all("joint"))
+      read(*joint, joint->has("command_interface"));
   }
 }
 

@@ -85,6 +85,9 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
                                       Allowed::positive(quantity::kFactor));
   axis.rate_gain = element.number("ruedo:rate_gain", axis.rate_gain,
                                   Allowed::positive(quantity::kDamping).or_infinite());
+  // With a servo it holds its position until its first command, as a real drive does.
+  if (element.has("ruedo:position_gain") || element.has("ruedo:rate_gain"))
+    axis.start.mode = JointStart::Mode::stay;
   return axis;
 }
 

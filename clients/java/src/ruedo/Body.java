@@ -1,8 +1,11 @@
 package ruedo;
 
-/** A set of links that do not move against each other, as ruedo/info lists it. */
+/**
+ * A set of links that do not move against each other, from {@link Simulation#bodies}; or a model,
+ * from {@link Simulation#body}. pose() and its like ask the server, and throw what a request does.
+ */
 public final class Body {
-    /** MODEL/LINK: what {@link Simulation#state(String)} takes. */
+    /** MODEL/LINK, or MODEL. */
     public final String name;
 
     /** True when it never moves. */
@@ -11,9 +14,47 @@ public final class Body {
     /** kg; 0 of what never moves. */
     public final double mass;
 
+    private final Simulation sim; // null: in ruedo/info
+
     Body(String name, boolean isStatic, double mass) {
+        this(null, name, isStatic, mass);
+    }
+
+    Body(Simulation sim, String name, boolean isStatic, double mass) {
+        this.sim = sim;
         this.name = name;
         this.isStatic = isStatic;
         this.mass = mass;
+    }
+
+    /** In the world, as it is now. */
+    public Transform pose() {
+        State state = sim.state(name);
+        return new Transform(state.position, state.orientation);
+    }
+
+    /** m/s, in the world. */
+    public double[] linearVelocity() {
+        return sim.state(name).linear;
+    }
+
+    /** rad/s, in the world. */
+    public double[] angularVelocity() {
+        return sim.state(name).angular;
+    }
+
+    /** Puts the model somewhere in the world, at rest. */
+    public void setPose(Transform pose) {
+        sim.setPose(name, pose.position(), pose.orientation());
+    }
+
+    /** The same on the ground: m, m, rad. */
+    public void setPose(double x, double y, double heading) {
+        setPose(Transform.of(x, y, heading));
+    }
+
+    /** Gives the model a velocity (m/s) and a turn rate (rad/s), in the world. */
+    public void setTwist(double[] linear, double[] angular) {
+        sim.setTwist(name, linear, angular);
     }
 }

@@ -45,6 +45,11 @@ public class Device<T extends Sample> extends Stream<T> {
     /** A sonar's transducers: x, y, z (m), roll, pitch, yaw (rad) in the device's frame. */
     public final double[][] elements;
 
+    /** Its frame in base_link at the start. */
+    public Transform transform() {
+        return new Transform(position, orientation);
+    }
+
     Device(StreamCore<T> core, device_info_t info, channel_info_t channel) {
         super(core, channel);
         robot = info.robot;

@@ -1,12 +1,14 @@
 package ruedo;
 
+import java.util.Iterator;
+
 /**
  * Reads a stream at a pace of its own, which other readers of the stream do not change. Thread
  * safe.
  *
  * @param <T> kind of sample
  */
-public class Reader<T extends Sample> {
+public class Reader<T extends Sample> implements Iterable<T> {
     static final double DEFAULT_TIMEOUT = 5.0; // s
 
     private final StreamCore<T> samples;
@@ -39,6 +41,15 @@ public class Reader<T extends Sample> {
      */
     public T next(double timeout) {
         return samples.read(place, true, timeout);
+    }
+
+    /**
+     * What next() returns, again and again, until the run ends: for (Scan scan : robot.lrf()). A
+     * loop slower than the stream gets the newest sample each time.
+     */
+    @Override
+    public Iterator<T> iterator() {
+        return new UntilRunEnds<>(() -> next(Double.POSITIVE_INFINITY));
     }
 
     /**

@@ -2,6 +2,7 @@ package ruedo;
 
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
+import ruedo.lcmtypes.joint_command_t;
 import ruedo.lcmtypes.move_command_t;
 import ruedo.lcmtypes.robot_info_t;
 import ruedo.lcmtypes.velocity_command_t;
@@ -10,7 +11,9 @@ import ruedo.lcmtypes.wheel_command_t;
 import java.util.ArrayList;
 import java.util.HashSet;
 import java.util.List;
+import java.util.Map;
 import java.util.Set;
+import java.util.TreeMap;
 import java.util.function.Consumer;
 
 /**
@@ -188,6 +191,70 @@ public final class Robot {
         return (Stream<Joints>) firstStream("joint_state_t", "joints");
     }
 
+    /**
+     * A joint by its name: its limits, its state and its commands. Throws UnknownName, which lists
+     * the joints.
+     */
+    public Joint joint(String name) {
+        JointLimits limits = sim.limitsOf(this.name);
+        return new Joint(this, limits, indexOf(limits, name));
+    }
+
+    private int indexOf(JointLimits limits, String joint) {
+        int index = limits.names.indexOf(joint);
+        if (index >= 0) return index;
+        throw new RuedoException.UnknownName(
+                name
+                        + " has no joint '"
+                        + joint
+                        + "'; it has "
+                        + (limits.names.isEmpty() ? "none" : String.join(", ", limits.names)));
+    }
+
+    /** {@link #commandJoints(Map, JointMode)} to positions, rad or m. */
+    public void commandJoints(Map<String, Double> positions) {
+        commandJoints(positions, JointMode.POSITION);
+    }
+
+    /**
+     * Commands joints by their names. Each holds what it was commanded until its next command; no
+     * watchdog ends that. values: rad or m, rad/s or m/s, N m or N; positions are kept within the
+     * joint's limits. Throws UnknownName, which lists the joints, NotSupported for a joint that
+     * takes no commands, and in lockstep.
+     */
+    public void commandJoints(Map<String, Double> values, JointMode mode) {
+        sim.checkOpen();
+        checkActsAtOnce("jointCommand(Map.of(...), mode)");
+        Command command = jointCommand(values, mode);
+        sim.bus.publish(command.channel, command.data);
+    }
+
+    /** What {@link #commandJoints} sends, for {@link Simulation#step(long, List)}. */
+    public Command jointCommand(Map<String, Double> values, JointMode mode) {
+        String channel = input("joint_command_t", "it has no joints");
+        JointLimits limits = sim.limitsOf(name);
+        boolean ofOthers = // the name of a detachable joint, a lift or a door: the server knows
+                mode == JointMode.ATTACHED || mode == JointMode.FLOOR || mode == JointMode.OPEN;
+        joint_command_t command = new joint_command_t();
+        command.utime = sim.clock.utime();
+        command.n = values.size();
+        command.name = new String[command.n];
+        command.mode = new byte[command.n];
+        command.value = new double[command.n];
+        int i = 0;
+        for (Map.Entry<String, Double> entry : new TreeMap<>(values).entrySet()) {
+            String joint = entry.getKey();
+            if (!ofOthers && !limits.takesCommands[indexOf(limits, joint)]) {
+                throw new RuedoException.NotSupported(
+                        "the joint " + joint + " of " + name + " takes no commands");
+            }
+            command.name[i] = joint;
+            command.mode[i] = (byte) mode.value;
+            command.value[i++] = finite(joint, entry.getValue());
+        }
+        return new Command(channel, Bus.encode(command));
+    }
+
     // Driving.
 
     /**
@@ -354,6 +421,11 @@ public final class Robot {
      */
     private Driver driver(String inSteps) {
         Driver driver = sim.driver(name);
+        checkActsAtOnce(inSteps);
+        return driver;
+    }
+
+    private void checkActsAtOnce(String inSteps) {
         if (sim.lockstep()) {
             throw new RuedoException.NotSupported(
                     "in lockstep a command acts at a step that its client chooses:"
@@ -361,15 +433,21 @@ public final class Robot {
                             + inSteps
                             + "))");
         }
-        return driver;
     }
 
     // Channels, by what info says of them: names on the bus may be remapped.
 
     private String input(String type) {
+        return input(type, "");
+    }
+
+    private String input(String type, String lack) {
         String drive = drive();
         for (channel_info_t channel : sim.info().channels(name)) {
             if (channel.input && channel.type.equals(type)) return channel.name;
+        }
+        if (!lack.isEmpty()) {
+            throw new RuedoException.NotSupported(name + " takes no " + type + ": " + lack);
         }
         if (drive.isEmpty()) {
             throw new RuedoException.NotSupported(

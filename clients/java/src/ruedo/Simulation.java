@@ -13,6 +13,7 @@ import java.io.IOException;
 import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.HashMap;
+import java.util.LinkedHashSet;
 import java.util.List;
 import java.util.Map;
 import java.util.Set;
@@ -170,7 +171,32 @@ public final class Simulation extends Requests implements AutoCloseable {
 
     /** All bodies that there are. */
     public List<Body> bodies() {
-        return info().bodies;
+        List<Body> all = new ArrayList<>();
+        for (Body one : info().bodies) all.add(new Body(this, one.name, one.isStatic, one.mass));
+        return all;
+    }
+
+    /**
+     * A model ("crate"), or a part of it ("crate/lid"): its pose, its twist, and putting it
+     * elsewhere. Throws UnknownName, which lists the models.
+     */
+    public Body body(String name) {
+        boolean found = false, isStatic = true;
+        double mass = 0.0;
+        Set<String> models = new LinkedHashSet<>();
+        for (Body one : info().bodies) {
+            models.add(one.name.split("/")[0]);
+            if (!one.name.equals(name) && !one.name.startsWith(name + "/")) continue;
+            found = true;
+            isStatic &= one.isStatic;
+            mass += one.mass;
+        }
+        if (found) return new Body(this, name, isStatic, mass);
+        throw new RuedoException.UnknownName(
+                "there is no model or MODEL/LINK '"
+                        + name
+                        + "'; there is "
+                        + (models.isEmpty() ? "none" : String.join(", ", models)));
     }
 
     /** The robot of that name. Throws UnknownName, which lists those that exist. */
@@ -179,6 +205,12 @@ public final class Simulation extends Requests implements AutoCloseable {
         synchronized (robots) {
             return robots.computeIfAbsent(name, key -> new Robot(this, key));
         }
+    }
+
+    /** A robot's joint limits: asked for once, and again where the world has changed. */
+    JointLimits limitsOf(String robot) {
+        robotInfo(robot);
+        return info().jointLimits.computeIfAbsent(robot, this::jointLimits);
     }
 
     /**
@@ -208,6 +240,57 @@ public final class Simulation extends Requests implements AutoCloseable {
                     checkServer();
                     standstill.look();
                 });
+    }
+
+    /**
+     * A loop at a period of sim time (s): for (double t : sim.every(0.1)) goes on at each multiple
+     * of it, with the time (s) of that moment, and leaves out those that have passed while the
+     * loop's body ran. Ends with the run.
+     */
+    public Iterable<Double> every(double period) {
+        long micros = Double.isFinite(period) ? Math.round(period * 1e6) : 0;
+        if (micros < 1)
+            throw new IllegalArgumentException(
+                    "period is " + period + ": it must be a number of seconds above 0");
+        return () -> {
+            long[] next = {0};
+            return new UntilRunEnds<>(() -> awaitMultiple(micros, next) * 1e-6);
+        };
+    }
+
+    private long awaitMultiple(long period, long[] next) {
+        checkOpen();
+        if (lockstep())
+            throw new RuedoException.NotSupported(
+                    "in lockstep nothing goes on without its clients: use sim.step(n)");
+        long begin = clock.utime();
+        long following = (begin / period + 1) * period;
+        boolean inTime = begin < next[0] + period && next[0] + period <= following;
+        next[0] = inTime ? next[0] + period : following; // the first, late, or a reset
+        sleep((next[0] - begin) * 1e-6);
+        return next[0];
+    }
+
+    /**
+     * Two streams joined by stamp: for (var both : sim.synchronised(robot.lrf(), robot.pose())) has
+     * in both.first each sample of the first stream, and in both.second what {@link Stream#at} of
+     * the other gives for its time. A loop slower than the stream gets the newest sample each time.
+     * Ends with the run.
+     */
+    public <A extends Sample, B extends Sample> Iterable<Synchronised<A, B>> synchronised(
+            Stream<A> first, Stream<B> second) {
+        return () -> {
+            second.core.subscribe();
+            Reader<A> reader = first.reader();
+            return new UntilRunEnds<>(
+                    () -> {
+                        while (true) { // until the first one that came after the other's first
+                            A sample = reader.next(Double.POSITIVE_INFINITY);
+                            B other = second.core.at(sample.utime, Reader.DEFAULT_TIMEOUT);
+                            if (other != null) return new Synchronised<>(sample, other);
+                        }
+                    });
+        };
     }
 
     // Control.

@@ -2,6 +2,7 @@ package ruedo;
 
 import ruedo.lcmtypes.channel_info_t;
 
+import java.util.Locale;
 import java.util.function.Consumer;
 
 /**
@@ -34,6 +35,31 @@ public class Stream<T extends Sample> extends Reader<T> {
     /** A reader that has seen nothing yet. */
     public Reader<T> reader() {
         return new Reader<>(core, new StreamCore.Place());
+    }
+
+    /** {@link #at(long, double)}, at most 5 s. */
+    public T at(long utime) {
+        return at(utime, DEFAULT_TIMEOUT);
+    }
+
+    /**
+     * The sample of a moment (us of sim time, such as scan.utime): waits until the stream has come
+     * so far, at most timeout seconds of real time. Where no sample is of that moment, a pose or
+     * odometry is interpolated between its neighbours, and of other streams it is the nearest. A
+     * stream keeps its last 256 samples, of 4 MB at most, from its first use on: for an earlier
+     * moment Timeout is thrown; {@link Simulation#synchronised} joins streams from the beginning.
+     */
+    public T at(long utime, double timeout) {
+        T found = core.at(utime, timeout);
+        if (found != null) return found;
+        throw new RuedoException.Timeout(
+                String.format(
+                        Locale.ROOT,
+                        "%s has no sample of %s s: those that it has kept, from its first use on,"
+                                + " begin at %s s. Use it before, or sim.synchronised()",
+                        channel,
+                        Deadline.text(utime * 1e-6),
+                        Deadline.text(core.keptFrom() * 1e-6)));
     }
 
     /**

@@ -4,10 +4,12 @@ import ruedo.lcmtypes.channel_info_t;
 
 import java.io.IOException;
 import java.nio.ByteBuffer;
+import java.util.ArrayDeque;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.atomic.AtomicLong;
+import java.util.function.BooleanSupplier;
 import java.util.function.Consumer;
 
 /**
@@ -23,6 +25,9 @@ final class StreamCore<T extends Sample> {
 
     /** Periods: gaps of samples that are taken at whole steps tell no more than that. */
     private static final double MOST_UNEVEN = 0.25;
+
+    private static final int MOST_KEPT = 256; // for at()
+    private static final long MOST_KEPT_BYTES = 4 << 20;
 
     /** How far a reader has come. */
     static final class Place {
@@ -73,6 +78,8 @@ final class StreamCore<T extends Sample> {
     private final List<Thread> waiting = new ArrayList<>(); // these under this object's monitor
     private Subscription source;
     private Arrival newest;
+    private final ArrayDeque<Arrival> kept = new ArrayDeque<>(); // for at(), the newest last
+    private long keptBytes;
     private long count; // samples that came or were lost
     private long lastUtime = NO_TIME;
     private RuedoException fault;
@@ -104,7 +111,7 @@ final class StreamCore<T extends Sample> {
         return subscription;
     }
 
-    private void subscribe() {
+    void subscribe() {
         sim.checkOpen();
         synchronized (this) {
             if (source != null) return;
@@ -140,6 +147,8 @@ final class StreamCore<T extends Sample> {
         newest = null;
         fault = null;
         lastUtime = NO_TIME;
+        kept.clear();
+        keptBytes = 0;
     }
 
     private RuedoException.TypeMismatch mismatch(long found) {
@@ -204,10 +213,57 @@ final class StreamCore<T extends Sample> {
     private synchronized void take(Arrival arrival) {
         newest = arrival;
         fault = null;
+        keep(arrival);
         count += 1 + lostBefore(arrival.utime);
         if (!waiting.isEmpty()) sim.progress.use(sim.clock.utime(), waiting);
         waiting.clear(); // who waits on says so
         notifyAll();
+    }
+
+    private void keep(Arrival arrival) {
+        if (arrival.utime == NO_TIME) return;
+        if (!kept.isEmpty() && arrival.utime < kept.getLast().utime) { // sim time was reset
+            kept.clear();
+            keptBytes = 0;
+        }
+        kept.addLast(arrival);
+        keptBytes += arrival.message.length;
+        while (kept.size() > MOST_KEPT || keptBytes > MOST_KEPT_BYTES)
+            keptBytes -= kept.removeFirst().message.length;
+    }
+
+    synchronized long keptFrom() {
+        return kept.isEmpty() ? 0 : kept.getFirst().utime;
+    }
+
+    /** Of that moment; null: it is before what is kept. */
+    T at(long utime, double timeout) {
+        if (!hasTime)
+            throw new RuedoException.NotSupported(
+                    channel + " carries " + type + ", whose messages have no time");
+        subscribe();
+        sim.noteUse();
+        sim.bus.catchUp();
+        Arrival before = null, after = null;
+        synchronized (this) {
+            await(() -> !kept.isEmpty() && kept.getLast().utime >= utime, timeout);
+            for (Arrival arrival : kept) {
+                after = arrival;
+                if (arrival.utime >= utime) break;
+                before = arrival;
+            }
+        }
+        sim.noteUse();
+        if (after.utime == utime) return after.sample();
+        return before == null ? null : between(before.sample(), after.sample(), utime);
+    }
+
+    @SuppressWarnings("unchecked")
+    private T between(T before, T after, long utime) {
+        if (before instanceof Pose) return (T) ((Pose) before).interpolated((Pose) after, utime);
+        if (before instanceof Odometry)
+            return (T) ((Odometry) before).interpolated((Odometry) after, utime);
+        return utime - before.utime < after.utime - utime ? before : after;
     }
 
     /** Whatever came, the receiving thread lives. */
@@ -244,7 +300,7 @@ final class StreamCore<T extends Sample> {
         long notBefore = newOne ? sim.notBefore() : Long.MIN_VALUE;
         Arrival arrival;
         synchronized (this) {
-            if (!serves(reader, newOne, notBefore)) await(reader, newOne, notBefore, timeout);
+            await(() -> serves(reader, newOne, notBefore), timeout);
             arrival = newest;
             if (reader.seen > 0) reader.skipped += Math.max(0, count - reader.seen - 1);
             reader.seen = count;
@@ -266,11 +322,12 @@ final class StreamCore<T extends Sample> {
         return reader.seen != count && newest.utime >= notBefore;
     }
 
-    private void await(Place reader, boolean newOne, long notBefore, double timeout) {
+    private void await(BooleanSupplier ready, double timeout) {
+        if (ready.getAsBoolean()) return;
         Deadline deadline = new Deadline(timeout);
         Thread me = Thread.currentThread();
         try {
-            while (!serves(reader, newOne, notBefore)) {
+            while (!ready.getAsBoolean()) {
                 if (fault != null) {
                     RuedoException thrown = fault;
                     fault = null;
@@ -289,7 +346,7 @@ final class StreamCore<T extends Sample> {
                 }
                 deadline.waitOn(this, 500);
                 sim.checkOpen();
-                if (!serves(reader, newOne, notBefore)) sim.checkServer(); // or the run has ended
+                if (!ready.getAsBoolean()) sim.checkServer(); // or the run has ended
             }
         } finally {
             waiting.remove(me);

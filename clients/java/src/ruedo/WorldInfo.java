@@ -14,6 +14,7 @@ import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.concurrent.ConcurrentHashMap;
 
 /** One complete ruedo/info; immutable. */
 final class WorldInfo {
@@ -26,6 +27,9 @@ final class WorldInfo {
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
     private final Map<String, Map<String, channel_info_t>> deviceChannels = new HashMap<>();
     private final Map<String, channel_info_t> outputs = new HashMap<>(); // by name
+
+    /** Of the robots that were asked for. */
+    final Map<String, JointLimits> jointLimits = new ConcurrentHashMap<>();
 
     private WorldInfo(List<world_info_t> parts) {
         head = parts.get(0);

@@ -1,0 +1,94 @@
+"""Bodies by their names: where they are, how they move, and putting them elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from .arguments import shown
+from .errors import UnknownName
+from .geometry import Floats, Transform
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+
+class Twist(NamedTuple):
+    """How something moves, in the world."""
+
+    linear: Floats  # (3,) m/s
+    angular: Floats  # (3,) rad/s
+
+
+@dataclass(frozen=True)
+class Body:
+    """A set of links that do not move against each other, from ``sim.bodies``; or a model, from
+    ``sim.body("crate")``. Each property asks the server for the state as it is then, and raises
+    what a request does.
+    """
+
+    name: str  # MODEL/LINK, or MODEL
+    is_static: bool  # it never moves
+    mass: float  # kg; 0 of what never moves
+    _simulation: Simulation | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def pose(self) -> Transform:
+        """In the world."""
+        state = self._of.state(self.name)
+        return Transform(state.position, state.orientation)
+
+    @property
+    def twist(self) -> Twist:
+        """In the world."""
+        state = self._of.state(self.name)
+        return Twist(state.linear, state.angular)
+
+    def set_pose(
+        self, x: float | Transform, y: float = 0.0, heading: float = 0.0, z: float = 0.0
+    ) -> None:
+        """Puts the model at x, y, z (m) with a heading (rad), or at a Transform, at rest. Raises
+        RequestError for a part of a model.
+        """
+        if isinstance(x, Transform):
+            at = x.position
+            self._of.set_pose(
+                self.name, at[0], at[1], z=at[2], orientation=x.orientation.tolist()
+            )
+        else:
+            self._of.set_pose(self.name, x, y, heading, z)
+
+    def set_twist(
+        self, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> None:
+        """Gives the model a velocity (m/s) and a turn rate (rad/s), in the world."""
+        self._of.set_twist(self.name, linear, angular)
+
+    def remove(self) -> None:
+        """Takes the model away."""
+        self._of.remove(self.name)
+
+    @property
+    def _of(self) -> Simulation:
+        assert self._simulation is not None
+        return self._simulation
+
+
+def found(bodies: Iterable[Body], name: str, simulation: Simulation) -> Body:
+    """A body, or a model's bodies as one. Raises UnknownName, which lists the models."""
+    there = list(bodies)
+    parts = [one for one in there if one.name == name or one.name.startswith(f"{name}/")]
+    if not parts:
+        models = dict.fromkeys(one.name.partition("/")[0] for one in there)
+        raise UnknownName(
+            f"there is no model or MODEL/LINK {shown(name)}; there is {', '.join(models) or 'none'}"
+        )
+    static = all(one.is_static for one in parts)
+    return replace(
+        parts[0],
+        name=name,
+        is_static=static,
+        mass=sum(one.mass for one in parts),
+        _simulation=simulation,
+    )

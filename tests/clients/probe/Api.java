@@ -1,0 +1,222 @@
+import ruedo.Body;
+import ruedo.Joint;
+import ruedo.JointMode;
+import ruedo.Joints;
+import ruedo.Observations;
+import ruedo.Pose;
+import ruedo.Robot;
+import ruedo.Ruedo;
+import ruedo.RuedoException;
+import ruedo.Scan;
+import ruedo.Simulation;
+import ruedo.Synchronised;
+import ruedo.Transform;
+
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Locale;
+import java.util.Map;
+
+/**
+ * What textbook programs use of the client, in Java; api.py and api.cpp are its twins, with the
+ * same commands and output.
+ */
+public final class Api {
+    private static final double PATIENCE = 300.0; // s, for what comes sooner or later
+
+    private Api() {}
+
+    private static void say(Object... words) {
+        StringBuilder line = new StringBuilder();
+        for (Object word : words) {
+            String text = String.valueOf(word);
+            if (word instanceof Double)
+                text = String.format(Locale.ROOT, "%.6f", word).replace("Infinity", "inf");
+            if (word instanceof Boolean) text = (Boolean) word ? "True" : "False";
+            line.append(line.length() == 0 ? "" : " ").append(text.replace("\n", " "));
+        }
+        System.out.println(line);
+    }
+
+    private static void attempt(String what, Runnable call) {
+        try {
+            call.run();
+            say(what, "none");
+        } catch (RuedoException error) {
+            say(what, error.getClass().getSimpleName() + ":", error.getMessage());
+        } catch (IllegalArgumentException error) {
+            say(what, "ValueError:", error.getMessage());
+        }
+    }
+
+    private static void joints(Simulation sim) {
+        Robot robot = sim.robot("arm");
+        for (String name : sim.jointLimits("arm").names) {
+            Joint joint = robot.joint(name);
+            say(
+                    name,
+                    joint.kind,
+                    joint.takesCommands,
+                    joint.holds,
+                    joint.lower,
+                    joint.upper);
+            say(name + "_most", joint.maxVelocity, joint.maxEffort);
+        }
+        attempt("unknown", () -> robot.joint("elbo"));
+        attempt("unknown_command", () -> robot.commandJoints(Map.of("elbo", 1.0)));
+        attempt("nan", () -> robot.commandJoints(Map.of("elbow", Double.NaN)));
+        attempt("mimic", () -> robot.commandJoints(Map.of("finger", 0.1)));
+        attempt("unknown_state", () -> robot.joints().latest(PATIENCE).position("elbo"));
+        robot.commandJoints(Map.of("shoulder", 0.5, "wrist", -0.25));
+        while (Math.abs(robot.joint("shoulder").position() - 0.5) > 1e-3) sim.sleep(0.05);
+        sim.sleep(1.0);
+        Joints state = robot.joints().next(PATIENCE);
+        say(
+                "reached",
+                state.position("shoulder"),
+                state.position("wrist"),
+                state.position("elbow"));
+        Joint joint = robot.joint("elbow");
+        joint.setVelocity(0.2);
+        sim.sleep(1.0);
+        say("velocity", joint.velocity());
+        robot.commandJoints(Map.of("elbow", 0.0), JointMode.VELOCITY);
+        robot.joint("wrist").setPosition(9.0); // beyond its limit
+        sim.sleep(2.0);
+        say("limited", robot.joint("wrist").position());
+    }
+
+    private static void jointsInLockstep(Simulation sim) {
+        Robot robot = sim.robot("arm");
+        sim.step(0);
+        attempt("at_once", () -> robot.commandJoints(Map.of("elbow", 0.1)));
+        Observations seen =
+                sim.step(
+                        400,
+                        List.of(robot.jointCommand(Map.of("elbow", 0.1), JointMode.POSITION)));
+        say("reached", seen.latest(robot.joints()).get().position("elbow"));
+    }
+
+    /** The robot turns about a circle: at each moment its place follows from its heading. */
+    private static void inStep(Simulation sim) {
+        Robot robot = sim.robot("p3at");
+        robot.setVelocity(0.5, 0.5);
+        robot.lrf().latest(PATIENCE);
+        List<Long> stamps = new ArrayList<>();
+        boolean rising = true;
+        double worst = 0.0;
+        for (Synchronised<Scan, Pose> both : sim.synchronised(robot.lrf(), robot.pose())) {
+            long stamp = both.first.utime;
+            rising &= stamps.isEmpty() || stamps.get(stamps.size() - 1) < stamp;
+            stamps.add(stamp);
+            worst = Math.max(worst, Math.abs(stamp - both.second.utime));
+            if (stamps.size() == 10) break;
+        }
+        say("joined", stamps.size(), worst, rising);
+        long last = stamps.get(stamps.size() - 1);
+        Pose between = robot.pose().at(last - 7000); // poses come each 20 ms
+        Pose before = robot.pose().at(last - 20000);
+        Pose after = robot.pose().at(last);
+        double share = 13.0 / 20.0;
+        double expected = (1 - share) * before.x() + share * after.x();
+        say("between", between.utime - last, between.x() - expected, before.x() != after.x());
+        say("nearest", robot.lrf().at(last + 130000, PATIENCE).utime - last); // each 100 ms
+        attempt("early", () -> robot.odometry().at(0));
+        int count = 0;
+        for (Scan scan : robot.lrf()) {
+            if (scan.ranges.length > 0 && ++count == 3) break;
+        }
+        List<Double> times = new ArrayList<>();
+        for (double t : sim.every(0.25)) {
+            times.add(t);
+            if (times.size() == 4) break;
+        }
+        say(
+                "every",
+                times.get(1) - times.get(0),
+                times.get(2) - times.get(1),
+                times.get(3) - times.get(2),
+                times.get(0) / 0.25 % 1.0);
+        attempt("period", () -> sim.every(0.0));
+        sim.quit();
+        int rest = 0, ticks = 0;
+        for (Scan scan : robot.lrf()) rest += scan.ranges.length > 0 ? 1 : 0;
+        for (double t : sim.every(0.1)) ticks += t > 0.0 ? 1 : 0;
+        say("ended", rest < 1000, ticks < 1000);
+    }
+
+    private static void bodies(Simulation sim) {
+        Body crate = sim.body("crate");
+        Transform pose = crate.pose();
+        say("crate", crate.isStatic, crate.mass, pose.x(), pose.y(), pose.heading());
+        crate.setPose(1.0, 2.0, 0.5);
+        say("put", crate.pose().x(), crate.pose().y(), crate.pose().heading());
+        crate.setTwist(new double[] {0.0, 0.0, 3.0}, new double[3]);
+        sim.step(10);
+        double up = crate.linearVelocity()[2];
+        say("rises", up < 3.0, up > 1.0, crate.pose().z() > 0.1);
+        attempt("unknown", () -> sim.body("crat"));
+        say("all", sim.bodies().size() > 1, sim.bodies().get(0).name);
+    }
+
+    private static void geometry(Simulation sim) {
+        Transform a = Transform.of(1.0, 2.0, 0.3);
+        Transform b =
+                new Transform(
+                        new double[] {0.5, -1.0, 0.25}, new double[] {0.5, 0.5, 0.5, 0.5});
+        Transform product = a.compose(b), identity = product.compose(product.inverse());
+        double[] q = product.orientation(), i = identity.orientation();
+        say("product", product.x(), product.y(), product.z(), q[0], q[1], q[2], q[3]);
+        say(
+                "identity",
+                identity.x(),
+                identity.y(),
+                identity.z(),
+                Math.abs(i[0]),
+                Math.abs(i[1]),
+                Math.abs(i[2]),
+                Math.abs(i[3]));
+        double[] applied = a.apply(1.0, 0.0, 0.0);
+        say("apply", applied[0], applied[1], applied[2]);
+        say(
+                "angles",
+                Transform.normalizeAngle(3.5),
+                Transform.normalizeAngle(-3.5),
+                Transform.normalizeAngle(7.0),
+                Transform.normalizeAngle(0.25),
+                Transform.normalizeAngle(-100.0));
+        Robot robot = sim.robot("p3at");
+        Scan scan = robot.lrf().latest(PATIENCE);
+        Pose pose = robot.pose().latest(PATIENCE);
+        double wall = 0.0;
+        for (double[] point : scan.points(pose.transform().compose(robot.lrf().transform()))) {
+            if (Math.abs(point[1]) < 1.0) wall = Math.max(wall, point[0]);
+        }
+        say("wall", wall);
+    }
+
+    public static void main(String[] args) {
+        try (Simulation sim = Ruedo.connect(args[0], "api", 60.0)) {
+            switch (args[1]) {
+                case "joints":
+                    joints(sim);
+                    break;
+                case "in_step":
+                    inStep(sim);
+                    break;
+                case "bodies":
+                    bodies(sim);
+                    break;
+                case "geometry":
+                    geometry(sim);
+                    break;
+                case "joints_in_lockstep":
+                    jointsInLockstep(sim);
+                    break;
+                default:
+                    throw new IllegalArgumentException(args[1]);
+            }
+        }
+        System.exit(0);
+    }
+}

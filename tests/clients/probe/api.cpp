@@ -1,0 +1,187 @@
+// What textbook programs use of the client, in C++; api.py and Api.java are its twins, with the
+// same commands and output.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ruedo/client.h"
+
+namespace rc = ruedo::client;
+
+namespace {
+
+constexpr double kPatience = 300.0;  // s, for what comes sooner or later
+
+std::string word(const std::string& text) { return text; }
+std::string word(const char* text) { return text; }
+std::string word(bool value) { return value ? "True" : "False"; }
+std::string word(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.6f", value);
+  return text;
+}
+template <class Integer>
+std::string word(Integer value) {
+  return std::to_string(value);
+}
+
+template <class... Words>
+void say(const Words&... words) {
+  std::string line;
+  ((line += (line.empty() ? "" : " ") + word(words)), ...);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::puts(line.c_str());
+  std::fflush(stdout);
+}
+
+void attempt(const std::string& what, const std::function<void()>& call) {
+  try {
+    call();
+    say(what, "none");
+  } catch (const rc::UnknownName& error) {
+    say(what, "UnknownName:", error.what());
+  } catch (const rc::NotSupported& error) {
+    say(what, "NotSupported:", error.what());
+  } catch (const rc::Timeout& error) {
+    say(what, "Timeout:", error.what());
+  } catch (const rc::RequestError& error) {
+    say(what, "RequestError:", error.what());
+  } catch (const std::invalid_argument& error) {
+    say(what, "ValueError:", error.what());
+  }
+}
+
+void joints(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("arm");
+  for (const std::string& name : sim.joint_limits("arm").names) {
+    const rc::Joint joint = robot.joint(name);
+    say(name, joint.kind(), joint.takes_commands(), joint.holds(), joint.lower(), joint.upper());
+    say(name + "_most", joint.max_velocity(), joint.max_effort());
+  }
+  attempt("unknown", [&] { (void)robot.joint("elbo"); });
+  attempt("unknown_command", [&] { robot.command_joints({{"elbo", 1.0}}); });
+  attempt("nan", [&] { robot.command_joints({{"elbow", std::nan("")}}); });
+  attempt("mimic", [&] { robot.command_joints({{"finger", 0.1}}); });
+  attempt("unknown_state", [&] { (void)robot.joints().latest(kPatience).position("elbo"); });
+  robot.command_joints({{"shoulder", 0.5}, {"wrist", -0.25}});
+  while (std::abs(robot.joint("shoulder").position() - 0.5) > 1e-3) sim.sleep(0.05);
+  sim.sleep(1.0);
+  const rc::Joints state = robot.joints().next(kPatience);
+  say("reached", state.position("shoulder"), state.position("wrist"), state.position("elbow"));
+  const rc::Joint joint = robot.joint("elbow");
+  joint.set_velocity(0.2);
+  sim.sleep(1.0);
+  say("velocity", joint.velocity());
+  robot.command_joints({{"elbow", 0.0}}, rc::JointMode::velocity);
+  robot.joint("wrist").set_position(9.0);  // beyond its limit
+  sim.sleep(2.0);
+  say("limited", robot.joint("wrist").position());
+}
+
+void joints_in_lockstep(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("arm");
+  sim.step(0);
+  attempt("at_once", [&] { robot.command_joints({{"elbow", 0.1}}); });
+  const rc::Observations seen = sim.step(400, {robot.joint_command({{"elbow", 0.1}})});
+  say("reached", seen.latest(robot.joints())->position("elbow"));
+}
+
+// The robot turns about a circle: at each moment its place follows from its heading.
+void in_step(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("p3at");
+  robot.set_velocity(0.5, 0.5);
+  (void)robot.lrf().latest(kPatience);
+  std::vector<int64_t> stamps;
+  bool rising = true;
+  double worst = 0.0;
+  for (const auto& [scan, pose] : sim.synchronised(robot.lrf(), robot.pose())) {
+    rising = rising && (stamps.empty() || stamps.back() < scan.utime);
+    stamps.push_back(scan.utime);
+    worst = std::max(worst, std::abs(static_cast<double>(scan.utime - pose.utime)));
+    if (stamps.size() == 10) break;
+  }
+  say("joined", stamps.size(), worst, rising);
+  const int64_t last = stamps.back();
+  const rc::Pose between = robot.pose().at(last - 7000);  // poses come each 20 ms
+  const rc::Pose before = robot.pose().at(last - 20000), after = robot.pose().at(last);
+  const double share = 13.0 / 20.0, expected = (1 - share) * before.x() + share * after.x();
+  say("between", between.utime - last, between.x() - expected, before.x() != after.x());
+  say("nearest", robot.lrf().at(last + 130000, kPatience).utime - last);  // each 100 ms
+  attempt("early", [&] { (void)robot.odometry().at(0); });
+  int count = 0;
+  for (const rc::Scan& scan : robot.lrf()) {
+    if (!scan.ranges.empty() && ++count == 3) break;
+  }
+  std::vector<double> times;
+  for (const double t : sim.every(0.25)) {
+    times.push_back(t);
+    if (times.size() == 4) break;
+  }
+  say("every", times[1] - times[0], times[2] - times[1], times[3] - times[2],
+      std::fmod(times[0] / 0.25, 1.0));
+  attempt("period", [&] { (void)sim.every(0.0); });
+  sim.quit();
+  int rest = 0, ticks = 0;
+  for (const rc::Scan& scan : robot.lrf()) rest += !scan.ranges.empty();
+  for (const double t : sim.every(0.1)) ticks += t > 0.0;
+  say("ended", rest < 1000, ticks < 1000);
+}
+
+void bodies(const rc::Simulation& sim) {
+  const rc::Body crate = sim.body("crate");
+  say("crate", crate.is_static, crate.mass, crate.pose().x(), crate.pose().y(),
+      crate.pose().heading());
+  crate.set_pose(1.0, 2.0, 0.5);
+  say("put", crate.pose().x(), crate.pose().y(), crate.pose().heading());
+  crate.set_twist({{0.0, 0.0, 3.0}, {}});
+  (void)sim.step(10);
+  say("rises", crate.twist().linear[2] < 3.0, crate.twist().linear[2] > 1.0,
+      crate.pose().z() > 0.1);
+  attempt("unknown", [&] { (void)sim.body("crat"); });
+  say("all", sim.bodies().size() > 1, sim.bodies().at(0).name);
+}
+
+void geometry(const rc::Simulation& sim) {
+  const rc::Transform a = rc::Transform::of(1.0, 2.0, 0.3);
+  const rc::Transform b{{0.5, -1.0, 0.25}, {0.5, 0.5, 0.5, 0.5}};
+  const rc::Transform product = a * b, identity = product * product.inverse();
+  const auto& [x, y, z] = product.position;
+  const auto& [qw, qx, qy, qz] = product.orientation;
+  say("product", x, y, z, qw, qx, qy, qz);
+  const auto& [ix, iy, iz] = identity.position;
+  say("identity", ix, iy, iz, std::abs(identity.orientation[0]), std::abs(identity.orientation[1]),
+      std::abs(identity.orientation[2]), std::abs(identity.orientation[3]));
+  const rc::Vector3 applied = a.apply({1.0, 0.0, 0.0});
+  say("apply", applied[0], applied[1], applied[2]);
+  say("angles", rc::normalize_angle(3.5), rc::normalize_angle(-3.5), rc::normalize_angle(7.0),
+      rc::normalize_angle(0.25), rc::normalize_angle(-100.0));
+  const rc::Robot robot = sim.robot("p3at");
+  const rc::Scan scan = robot.lrf().latest(kPatience);
+  const rc::Pose pose = robot.pose().latest(kPatience);
+  double wall = 0.0;
+  for (const rc::Vector3& point : scan.points(pose.transform() * robot.lrf().transform())) {
+    if (std::abs(point[1]) < 1.0) wall = std::max(wall, point[0]);
+  }
+  say("wall", wall);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) return 2;
+  const rc::Simulation sim = rc::connect(argv[1], {.name = "api", .timeout = 60.0});
+  const std::map<std::string, std::function<void()>> commands{
+      {"joints", [&] { joints(sim); }},
+      {"in_step", [&] { in_step(sim); }},
+      {"bodies", [&] { bodies(sim); }},
+      {"geometry", [&] { geometry(sim); }},
+      {"joints_in_lockstep", [&] { joints_in_lockstep(sim); }},
+  };
+  commands.at(argv[2])();
+}

@@ -1,0 +1,129 @@
+"""What textbook programs use of the client, in Python; api.cpp and Api.java are its twins, with the
+same commands and output."""
+
+import sys
+
+import ruedo
+
+PATIENCE = 300.0  # s, for what comes sooner or later
+
+
+def say(*words):
+    print(*(f"{w:.6f}" if isinstance(w, float) else w for w in words), flush=True)
+
+
+def attempt(what, call):
+    try:
+        call()
+        say(what, "none")
+    except (ruedo.RuedoError, ValueError) as error:
+        say(what, f"{type(error).__name__}:", str(error).replace("\n", " "))
+
+
+def joints(sim):
+    robot = sim.robot("arm")
+    for name in robot.joints.names:
+        joint = robot.joints[name]
+        say(name, joint.kind, joint.takes_commands, joint.holds, joint.lower, joint.upper)
+        say(f"{name}_most", joint.max_velocity, joint.max_effort)
+    attempt("unknown", lambda: robot.joints["elbo"])
+    attempt("unknown_command", lambda: robot.command_joints({"elbo": 1.0}))
+    attempt("nan", lambda: robot.command_joints({"elbow": float("nan")}))
+    attempt("mimic", lambda: robot.command_joints({"finger": 0.1}))
+    attempt("unknown_state", lambda: robot.joints.latest(PATIENCE).position("elbo"))
+    robot.command_joints({"shoulder": 0.5, "wrist": -0.25})
+    while abs(robot.joints["shoulder"].position - 0.5) > 1e-3:
+        sim.sleep(0.05)
+    sim.sleep(1.0)
+    state = robot.joints.next(PATIENCE)
+    say("reached", *(state.position(name) for name in ("shoulder", "wrist", "elbow")))
+    joint = robot.joints["elbow"]
+    joint.velocity = 0.2
+    sim.sleep(1.0)
+    say("velocity", joint.velocity)
+    robot.command_joints({"elbow": 0.0}, mode="velocity")
+    robot.joints["wrist"].position = 9.0  # beyond its limit
+    sim.sleep(2.0)
+    say("limited", robot.joints["wrist"].position)
+
+
+def joints_in_lockstep(sim):
+    robot = sim.robot("arm")
+    sim.step(0)
+    attempt("at_once", lambda: robot.command_joints({"elbow": 0.1}))
+    seen = sim.step(400, [robot.joint_command({"elbow": 0.1})])
+    say("reached", seen.latest(robot.joints).position("elbow"))
+
+
+def in_step(sim):
+    """The robot turns about a circle: at each moment its place follows from its heading."""
+    robot = sim.robot("p3at")
+    robot.set_velocity(0.5, 0.5)
+    robot.lrf.latest(PATIENCE)
+    stamps, pairs, worst = [], 0, 0.0
+    for scan, pose in sim.synchronised(robot.lrf, robot.pose):
+        stamps.append(scan.utime)
+        worst = max(worst, abs(scan.utime - pose.utime))
+        pairs += 1
+        if pairs == 10:
+            break
+    say("joined", pairs, worst, all(b > a for a, b in zip(stamps, stamps[1:])))
+    between = robot.pose.at(stamps[-1] - 7_000)  # poses come each 20 ms
+    before, after = robot.pose.at(stamps[-1] - 20_000), robot.pose.at(stamps[-1])
+    share = 13.0 / 20.0
+    expected = (1 - share) * before.x + share * after.x
+    say("between", between.utime - stamps[-1], between.x - expected, before.x != after.x)
+    scans = [robot.lrf.at(stamps[-1] + 130_000, PATIENCE).utime - stamps[-1]]  # each 100 ms
+    say("nearest", *scans)
+    attempt("early", lambda: robot.odometry.at(0))
+    count = 0
+    for scan in robot.lrf:
+        count += 1
+        if count == 3:
+            break
+    times = []
+    for t in sim.every(0.25):
+        times.append(t)
+        if len(times) == 4:
+            break
+    say("every", *(b - a for a, b in zip(times, times[1:])), (times[0] / 0.25) % 1.0)
+    attempt("period", lambda: sim.every(0.0))
+    sim.quit()
+    say("ended", sum(1 for _ in robot.lrf) < 1000, sum(1 for _ in sim.every(0.1)) < 1000)
+
+
+def bodies(sim):
+    crate = sim.body("crate")
+    say("crate", crate.is_static, crate.mass, crate.pose.x, crate.pose.y, crate.pose.heading)
+    crate.set_pose(1.0, 2.0, 0.5)
+    say("put", crate.pose.x, crate.pose.y, crate.pose.heading)
+    crate.set_twist((0.0, 0.0, 3.0))
+    sim.step(10)
+    say("rises", crate.twist.linear[2] < 3.0, crate.twist.linear[2] > 1.0, crate.pose.z > 0.1)
+    attempt("unknown", lambda: sim.body("crat"))
+    say("all", len(sim.bodies) > 1, sim.bodies[0].name)
+
+
+def geometry(sim):
+    a, b = ruedo.Transform.of(1.0, 2.0, 0.3), ruedo.Transform((0.5, -1.0, 0.25), (0.5, 0.5, 0.5, 0.5))
+    product = a @ b
+    say("product", *map(float, product.position), *map(float, product.orientation))
+    identity = product @ product.inverse()
+    say("identity", *map(float, identity.position), *map(abs, map(float, identity.orientation)))
+    say("apply", *map(float, a.apply((1.0, 0.0, 0.0))))
+    say("angles", *map(ruedo.normalize_angle, (3.5, -3.5, 7.0, 0.25, -100.0)))
+    robot = sim.robot("p3at")
+    scan = robot.lrf.latest(PATIENCE)
+    pose = robot.pose.latest(PATIENCE)
+    world = pose.transform @ robot.lrf.transform
+    ahead = [world.apply(point) for point in scan.points()]
+    say("wall", max(float(one[0]) for one in ahead if abs(one[1]) < 1.0))
+
+
+def main():
+    url, command, *rest = sys.argv[1:]
+    with ruedo.connect(url, name="api", timeout=60.0) as sim:
+        globals()[command](sim, *rest)
+
+
+main()
