@@ -53,7 +53,7 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .launch import find_ruedo, launch
     from .lockstep import Command, Message, Observations
     from .logs import Log, LogChannel, open_log, read_log
-    from .maps import OccupancyMap, load_map
+    from .maps import Map, OccupancyMap, load_map
     from .motion import Motion
     from .robot import Camera, Device, Robot
     from .samples import *  # noqa: F403
@@ -95,13 +95,13 @@ __all__ = [
     "LeaseLost",
     "Log",
     "LogChannel",
+    "Map",
     "Message",
     "Motion",
     "MotionError",
     "NoServer",
     "NotSupported",
     "Observations",
-    "OccupancyMap",
     "Reader",
     "RequestError",
     "Robot",

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import NotSupported
+
 
 def png(pixels: NDArray[Any]) -> bytes:
     """(height, width) or (height, width, 3) uint8 as a PNG."""
@@ -54,3 +56,14 @@ def scan_svg(points: NDArray[np.float64], size: int = 240) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{size}" height="{size}"><rect width="{size}" height="{size}" fill="#fff" stroke="#999"/>'
         f'<g fill="#246">{dots}</g>{robot}<text x="6" y="{size - 6}" font-family="sans-serif" font-size="11">{2 * reach / 0.92:.3g} m wide</text></svg>'
     )
+
+
+def axes_of(axes: Any) -> Any:
+    """matplotlib's; None: new ones. Raises NotSupported where it is not installed."""
+    if axes is not None:
+        return axes
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise NotSupported("plot() needs matplotlib: pip install matplotlib") from None
+    return pyplot.subplots()[1]
