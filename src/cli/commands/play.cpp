@@ -16,6 +16,7 @@
 #include "bus/url_claim.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
+#include "cli/support/played_run.h"
 #include "cli/support/range.h"
 #include "cli/support/sandboxed.h"
 #include "cli/support/signal_thread.h"
@@ -31,6 +32,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kLongestSleep = std::chrono::milliseconds(100);  // Ctrl-C is seen after that
+constexpr auto kShortSleep = std::chrono::milliseconds(5);      // a client's question is
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -44,7 +46,7 @@ void heed(int signal) {
 struct PlayArguments {
   std::string log, speed = "1", lcm, view, html, other;
   double html_size = 20.0;
-  bool viewed = false, sandboxed = false;
+  bool viewed = false, sandboxed = false, waits = false;
 };
 
 // Channels that only a log has: they were never published.
@@ -63,8 +65,9 @@ Clock::time_point due(Clock::time_point begin, SimTime after_us, double speed) {
          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s));
 }
 
-bool sleep_until(Clock::time_point time) {
+bool sleep_until(Clock::time_point time, PlayedRun& run, SimTime now_us) {
   while (!interrupted) {
+    run.serve(now_us);
     const auto now = Clock::now();
     if (now >= time) return true;
     std::this_thread::sleep_until(std::min(time, now + kLongestSleep));
@@ -101,7 +104,7 @@ int play(const PlayArguments& arguments) {
   const ros2::BagLog played(arguments.log);  // as a log, where it is a bag
   log::Reader log(played.path());
   bus::LcmBus bus(arguments.lcm);
-  bus.keep_connected();
+  PlayedRun run(played.path(), bus);
   if (const std::string server = bus::claimed_by(bus.url());
       !server.empty() && bus.url().scheme == "udpm")  // the others need one that carries it
     to_stderr(
@@ -112,14 +115,18 @@ int play(const PlayArguments& arguments) {
   int64_t messages = 0;
   SimTime first_us = 0;
   Clock::time_point begin;
+  while (arguments.waits && !interrupted && !run.asked()) std::this_thread::sleep_for(kShortSleep);
   while (!interrupted && log.next(event)) {
     if (in_logs_only(event.channel)) continue;
     if (messages == 0) first_us = event.timestamp_us, begin = Clock::now();
-    if (std::isfinite(speed) && !sleep_until(due(begin, event.timestamp_us - first_us, speed)))
+    run.serve(event.timestamp_us);
+    if (std::isfinite(speed) && !sleep_until(due(begin, event.timestamp_us - first_us, speed), run,
+                                             event.timestamp_us))
       break;
     bus.publish(event.channel, event.data.data(), event.data.size());
     ++messages;
   }
+  run.end();
   if (!log.fault().empty()) to_stderr("ruedo: {}: {}\n", arguments.log, log.fault());
   const double seconds =
       messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
@@ -159,6 +166,7 @@ void add_play(CLI::App& app, Action& chosen) {
       ->add_option("--lcm", arguments->lcm,
                    "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
       ->type_name("URL");
+  command->add_flag("--wait", arguments->waits, "begin when the first client joins");
   add_plugin_argument(*command);
   add_types_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
