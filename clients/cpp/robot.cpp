@@ -250,6 +250,27 @@ Stream<OdometryTwist> Robot::odometry_twist() const {
   return first_stream<OdometryTwist>(*core_, name_, "velocity of odometry");
 }
 Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
+Device<NavSat> Robot::gps() const {
+  return first_device<NavSat>(*core_, name_, "satellite receiver");
+}
+Device<Magnetometer> Robot::magnetometer() const {
+  return first_device<Magnetometer>(*core_, name_, "magnetometer");
+}
+Device<Altimeter> Robot::altimeter() const {
+  return first_device<Altimeter>(*core_, name_, "altimeter");
+}
+Device<AirPressure> Robot::air_pressure() const {
+  return first_device<AirPressure>(*core_, name_, "barometer");
+}
+Device<AirSpeed> Robot::air_speed() const {
+  return first_device<AirSpeed>(*core_, name_, "air speed sensor");
+}
+Device<ForceTorque> Robot::force_torque() const {
+  return first_device<ForceTorque>(*core_, name_, "force-torque sensor");
+}
+Device<LogicalCamera> Robot::logical_camera() const {
+  return first_device<LogicalCamera>(*core_, name_, "logical camera");
+}
 Device<Contact> Robot::contact() const {
   return first_device<Contact>(*core_, name_, "contact sensor");
 }
@@ -296,6 +317,19 @@ Camera Robot::camera() const {
 
 void Robot::set_velocity(double v, double omega, double vy) const {
   keep_sending(*core_, name_, velocity_command(v, omega, vy), "velocity_command(v, omega)");
+}
+
+Driving Robot::driving(double v, double omega, double vy) const {
+  set_velocity(v, omega, vy);
+  return {core_, name_};
+}
+
+Driving::~Driving() {
+  if (!core_) return;
+  try {
+    Robot(core_, robot_).stop();
+  } catch (const std::exception&) {  // the simulation was closed, or the robot is gone
+  }
 }
 
 void Robot::set_wheels(double left, double right) const {

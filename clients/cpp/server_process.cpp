@@ -127,6 +127,18 @@ void add_options(const LaunchOptions& options, std::vector<std::string>& command
   for (const std::string& device : options.disable) add("--disable", device);
   for (const auto& [key, value] : options.set)
     add("--set", std::string(key).append("=").append(value));
+  if (std::isfinite(options.duration)) {
+    std::ostringstream seconds;
+    seconds << options.duration;
+    add("--duration", seconds.str());
+  }
+  if (options.paused) command.emplace_back("--paused");
+  if (!options.record.empty()) add("--record", options.record);
+  if (!options.snapshots.empty()) add("--snapshots", options.snapshots);
+  for (const std::string& drive : options.drive) add("--drive", drive);
+  for (const std::string& fault : options.fault) add("--fault", fault);
+  for (const std::string& plugin : options.plugin) add("--plugin", plugin);
+  for (const std::string& input : options.wait_for) add("--wait-for", input);
   if (!options.noise) command.emplace_back("--no-noise");
   command.insert(command.end(), options.args.begin(), options.args.end());
 }

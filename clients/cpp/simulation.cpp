@@ -117,6 +117,12 @@ void Simulation::sleep(Duration time) const {
   core->sleep(std::llround(seconds * 1e6));
 }
 
+void Simulation::publish(const std::string& channel, const std::vector<uint8_t>& bytes) const {
+  const auto core = this->core();
+  core->check_open();
+  core->bus().publish(channel, bytes.data(), bytes.size());
+}
+
 Every Simulation::every(Duration period) const {
   const int64_t period_us = std::isfinite(period.count()) ? std::llround(period.count() * 1e6) : 0;
   if (period_us < 1)

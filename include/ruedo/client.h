@@ -564,6 +564,22 @@ class Joint {
   bool takes_commands_, holds_;
 };
 
+/// The robot drives while this lives, from Robot::driving(). Move-only.
+class [[nodiscard]] Driving {
+ public:
+  /// @cond
+  Driving(std::shared_ptr<Core> core, std::string robot)
+      : core_(std::move(core)), robot_(std::move(robot)) {}
+  Driving(Driving&&) noexcept = default;
+  Driving& operator=(Driving&&) = delete;
+  ~Driving();
+  /// @endcond
+
+ private:
+  std::shared_ptr<Core> core_;
+  std::string robot_;
+};
+
 /// A robot of the simulation: its sensors and its drive. Copies are the same robot.
 class Robot {
  public:
@@ -611,6 +627,13 @@ class Robot {
   Device<Odometry> odometry() const;   ///< @return the odometry
   /// @return what the odometry makes of the wheels' speeds, also sideways
   Stream<OdometryTwist> odometry_twist() const;
+  Device<NavSat> gps() const;  ///< @return the satellite receiver; see NavSat::enu()
+  Device<Magnetometer> magnetometer() const;    ///< @return the magnetometer
+  Device<Altimeter> altimeter() const;          ///< @return the altimeter
+  Device<AirPressure> air_pressure() const;     ///< @return the barometer
+  Device<AirSpeed> air_speed() const;           ///< @return the Pitot tube
+  Device<ForceTorque> force_torque() const;     ///< @return the force-torque sensor
+  Device<LogicalCamera> logical_camera() const; ///< @return the logical camera
   Camera camera() const;            ///< @return the camera
   Device<Imu> imu() const;          ///< @return the inertial unit
   Device<Contact> contact() const;  ///< @return the bumper
@@ -646,14 +669,24 @@ class Robot {
   void command_joints(const std::map<std::string, double>& values,
                       JointMode mode = JointMode::position) const;
 
-  /// Drives within the robot's limits until the next command of any kind: the command is repeated
-  /// in the background, so that the watchdog does not stop the robot.
+  /// Drives within the robot's limits until the next command of any kind: this program repeats it
+  /// in the background, so that the watchdog does not stop the robot. It lapses the watchdog's time
+  /// after the program has ended or was stopped. driving() shows in the program how long that is to
+  /// last.
   /// @param v m/s ahead
   /// @param omega rad/s, positive to the left
   /// @param vy m/s to the left, of a robot that moves sideways
   /// @throws std::invalid_argument for what is not finite; NotSupported for a robot without a
   /// drive, for vy of one that does not move sideways, and in lockstep; NoServer
   void set_velocity(double v, double omega, double vy = 0.0) const;
+  /// As set_velocity(), for as long as the returned object lives; then the robot stops:
+  /// `{ const auto driving = robot.driving(0.3, 0.0); ... }`.
+  /// @param v m/s ahead
+  /// @param omega rad/s, positive to the left
+  /// @param vy m/s to the left, of a robot that moves sideways
+  /// @return stops the robot when it goes
+  /// @throws as set_velocity()
+  [[nodiscard]] Driving driving(double v, double omega, double vy = 0.0) const;
   /// The same with the rates of the wheels.
   /// @param left rad/s, positive ahead
   /// @param right rad/s, positive ahead
@@ -892,6 +925,21 @@ class [[nodiscard]] Simulation : public Requests {
   void markers(const std::string& layer, const std::vector<Marker>& markers = {},
                const std::string& frame = "") const;
 
+  /// Sends a message to the server and to whoever listens at url().
+  /// @param channel such as "p3at/velocity"; in lockstep commands belong to step()
+  /// @param bytes LCM's encoding of it
+  /// @throws NoServer; Error for more than a server takes
+  void publish(const std::string& channel, const std::vector<uint8_t>& bytes) const;
+  /// The same with an object of a class that lcm-gen made.
+  /// @param channel as above
+  /// @param message any
+  template <class Message, class = decltype(&Message::getHash)>
+  void publish(const std::string& channel, const Message& message) const {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    publish(channel, bytes);
+  }
+
   /// Ends repeated commands, and a server that launch() started; a second time nothing. In a
   /// callback it returns at once, and the end follows by itself; a second call, or the destructor,
   /// waits for it.
@@ -936,6 +984,14 @@ struct LaunchOptions {
   std::vector<std::string> disable;        ///< devices that are left out: "p3at/camera"
   std::map<std::string, std::string> set;  ///< {{"p3at/lrf.rate", "20"}}
   bool noise = true;                       ///< false: ideal values
+  double duration = kForever;              ///< s of sim time after which the run ends
+  bool paused = false;                     ///< it starts so, at step 0
+  std::string record;                      ///< file of a log; "": none
+  std::string snapshots;                   ///< folder for snapshot() and restore(); "": none
+  std::vector<std::string> drive;          ///< by wheel joints: "rover=left_joint,right_joint"
+  std::vector<std::string> fault;          ///< what goes wrong: "p3at/lrf:freeze@3"
+  std::vector<std::string> plugin;         ///< shared libraries with sensors or drives
+  std::vector<std::string> wait_for;       ///< where a command is due: "p3at/velocity@10"
   std::string text;               ///< the world's SDF or URDF itself, where the world is ""
   std::vector<std::string> args;  ///< further options of `ruedo run`
   std::string url;                ///< "": a local socket, which no other user of the machine

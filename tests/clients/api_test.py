@@ -6,7 +6,7 @@ import math
 import subprocess
 
 import pytest
-from conftest import APIS, HALL, PATIENCE, Said, chosen, ruedo_run
+from conftest import APIS, HALL, PATIENCE, RUEDO, Said, Server, chosen, free_url, ruedo_run
 
 
 @pytest.fixture(params=list(chosen(APIS)))
@@ -149,3 +149,109 @@ def test_frames_and_angles(language):
     expected = [math.remainder(one, math.tau) for one in (3.5, -3.5, 7.0, 0.25, -100.0)]
     assert said.numbers("angles") == pytest.approx(expected, abs=1e-6)
     assert said.numbers("wall") == pytest.approx([6.0], abs=1e-3)  # the wall's face
+
+
+def test_driving_lasts_for_its_block_and_a_published_command_lapses(language):
+    with ruedo_run("--no-noise", "--rate", "4", "--disable", "p3at/camera", world=HALL) as server:
+        said = api(language, server.url, "driving")
+    assert said.words("went") == ["True"]
+    assert said.numbers("published") == pytest.approx([0.1], abs=1e-6)
+
+
+def receiver(name, pose):
+    return (
+        f"<model name='{name}'><static>true</static><pose>{pose}</pose><link name='link'>"
+        "<sensor name='gps' type='navsat'><update_rate>5</update_rate></sensor>"
+        "<sensor name='imu' type='imu'><update_rate>5</update_rate></sensor></link></model>"
+    )
+
+
+def test_fixes_in_metres_and_headings(language, tmp_path):
+    """East, north and up of one receiver from the other are the places of the file."""
+    (tmp_path / "gps.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><spherical_coordinates><surface_model>EARTH_WGS84</surface_model>"
+        "<latitude_deg>47.5</latitude_deg><longitude_deg>-8.25</longitude_deg><elevation>400</elevation>"
+        "<heading_deg>0</heading_deg></spherical_coordinates>"
+        + receiver("here", "0 0 0 0 0 0")
+        + receiver("there", "30 -40 5 0 0 0.7")
+        + "</world></sdf>"
+    )
+    with ruedo_run("--no-noise", world=str(tmp_path / "gps.sdf")) as server:
+        said = api(language, server.url, "fixes")
+    assert said.numbers("enu") == pytest.approx([30.0, -40.0, 5.0], abs=2e-3)
+    assert said.numbers("heading") == pytest.approx([0.7], abs=1e-6)
+    assert said.one("none").startswith("UnknownName: here has no magnetometer; it has ")
+
+
+def test_a_log_that_is_played_feeds_the_program_that_drove(tmp_path):
+    """connect() works on it; what would change the run is refused; its end is the run's."""
+    import ruedo
+
+    log = str(tmp_path / "run.lcm")
+    with ruedo.launch(HALL, rate="max", noise=False, record=log, disable=["p3at/camera"]) as sim:
+        robot = sim.robot("p3at")
+        robot.advance(1.0).wait()
+        sim.sleep(1.0)
+        reached = robot.pose.latest().x
+    url = free_url()
+    with Server([RUEDO, "play", log, "--lcm", url, "--speed", "4", "--wait"], url):
+        with ruedo.connect(url, timeout=PATIENCE) as sim:
+            robot = sim.robot("p3at")
+            assert sim.world == "hall" and robot.lrf.range_max > 1.0 and sim.url == url
+            with pytest.raises(ruedo.NotSupported):
+                robot.set_velocity(0.1, 0.0)
+            with pytest.raises(ruedo.NotSupported):
+                sim.pause()
+            xs = [pose.x for _, pose in sim.synchronised(robot.lrf, robot.pose)]
+            assert sim.time > 1.0
+            assert xs[-1] == pytest.approx(reached, abs=1e-3) and len(xs) > 10
+
+
+def test_launch_has_options_by_name_and_suggests(tmp_path):
+    import ruedo
+
+    with pytest.raises(TypeError, match=r"launch\(\) has no option lockstpe: did you mean lockstep\?"):
+        ruedo.launch(HALL, lockstpe=1)
+    with pytest.raises(TypeError, match=r"no option worlds_; it has world, |did you mean"):
+        ruedo.launch(HALL, worlds_=1)
+    log = str(tmp_path / "run.lcm")
+    with ruedo.launch(HALL, rate="max", duration=1.5, record=log, disable=["p3at/camera"]) as sim:
+        times = [pose.time for pose in sim.robot("p3at").pose]  # ends with the run
+    assert times[-1] <= 1.5
+    with ruedo.launch(HALL, paused=True, disable=["p3at/camera"]) as sim:
+        assert sim.state().step == 0
+
+
+def test_asyncio_reads_streams_without_threads_of_the_users():
+    import asyncio
+
+    import ruedo
+
+    async def read(sim, counts):
+        async for scan in sim.robot("p3at").lrf:
+            counts.append(scan.utime)
+            if len(counts) == 5:
+                return
+
+    async def both(sim):
+        scans, ticks, poses = [], [], []
+
+        async def beat():
+            async for t in sim.every(0.1):
+                ticks.append(t)
+                if len(ticks) == 5:
+                    return
+
+        async def follow():
+            async for pose in sim.robot("p3at").pose.reader():
+                poses.append(pose.utime)
+                if len(poses) == 20:
+                    return
+
+        await asyncio.wait_for(asyncio.gather(read(sim, scans), beat(), follow()), PATIENCE)
+        return scans, ticks, poses
+
+    with ruedo.launch(HALL, noise=False, disable=["p3at/camera"]) as sim:
+        scans, ticks, poses = asyncio.run(both(sim))
+    assert scans == sorted(set(scans)) and poses == sorted(set(poses))
+    assert [round(one / 0.1, 6) % 1.0 for one in ticks] == pytest.approx([0.0] * 5)

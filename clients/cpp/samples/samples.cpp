@@ -29,6 +29,8 @@ double Joints::effort(const std::string& joint) const { return efforts.at(index(
 
 namespace {
 
+constexpr double kRadian = 3.14159265358979323846 / 180.0;  // of a degree
+
 double mixed(double first, double second, double share) {
   return (1.0 - share) * first + share * second;
 }
@@ -70,6 +72,31 @@ std::vector<Vector3> Scan::points(const Transform& device) const {
           device.apply({range * std::cos(angle(i)), range * std::sin(angle(i)), 0.0}));
   }
   return points;
+}
+
+namespace {
+
+// Earth-centred, Earth-fixed coordinates, m: WGS 84 (NIMA TR8350.2, eq. 4-14).
+Vector3 earth_centred(const NavSat& fix) {
+  constexpr double kAxis = 6378137.0, kFlattening = 1.0 / 298.257223563;
+  constexpr double kSquared = kFlattening * (2.0 - kFlattening);
+  const double latitude = fix.latitude_deg * kRadian, longitude = fix.longitude_deg * kRadian;
+  const double sine = std::sin(latitude), normal = kAxis / std::sqrt(1.0 - kSquared * sine * sine);
+  const double along = (normal + fix.altitude) * std::cos(latitude);
+  return {along * std::cos(longitude), along * std::sin(longitude),
+          ((1.0 - kSquared) * normal + fix.altitude) * sine};
+}
+
+}  // namespace
+
+Vector3 NavSat::enu(const NavSat& origin) const {
+  const Vector3 here = earth_centred(*this), there = earth_centred(origin);
+  const double x = here[0] - there[0], y = here[1] - there[1], z = here[2] - there[2];
+  const double latitude = origin.latitude_deg * kRadian, longitude = origin.longitude_deg * kRadian;
+  const double along = std::cos(longitude) * x + std::sin(longitude) * y;
+  return {-std::sin(longitude) * x + std::cos(longitude) * y,
+          -std::sin(latitude) * along + std::cos(latitude) * z,
+          std::cos(latitude) * along + std::sin(latitude) * z};
 }
 
 Odometry Odometry::interpolated(const Odometry& later, int64_t at) const {

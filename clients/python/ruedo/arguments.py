@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import difflib
+import functools
 import inspect
 import math
 import operator
 import os
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import CONTROL
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 MOST_WHOLE = 2**63 - 1
 MOST_SEED = 2**64 - 1
@@ -136,6 +141,23 @@ def finite(what: str, value: Any, low: float = -math.inf) -> float:
         allowed = "" if low == -math.inf else f", {low:g} or more"
         raise ValueError(f"{what} is {value}: it must be a finite number{allowed}")
     return given
+
+
+def suggesting(call: Callable[P, R]) -> Callable[P, R]:
+    """The call with a TypeError for an option that it does not have, which suggests one."""
+    allowed = [name for name in inspect.signature(call).parameters if name != "self"]
+    shown_name = call.__qualname__.removesuffix(".__init__")
+
+    @functools.wraps(call)
+    def checked(*given: P.args, **options: P.kwargs) -> R:
+        for name in options:
+            if name not in allowed:
+                near = difflib.get_close_matches(name, allowed, 1)
+                hint = f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
+                raise TypeError(f"{shown_name}() has no option {name}{hint}")
+        return call(*given, **options)
+
+    return checked
 
 
 def check_callback(value: Any) -> None:

@@ -62,6 +62,7 @@ def _is_program(path: Path) -> bool:
     return path.is_file() and os.access(path, os.X_OK)
 
 
+@arguments.suggesting
 def launch(
     world: str | os.PathLike[str] | World | None = None,
     *,
@@ -79,6 +80,14 @@ def launch(
     set: Mapping[str, object] | None = None,
     noise: bool = True,
     view: bool = False,
+    duration: float | None = None,
+    paused: bool = False,
+    record: str | os.PathLike[str] | None = None,
+    snapshots: str | os.PathLike[str] | None = None,
+    drive: Sequence[str] = (),
+    fault: Sequence[str] = (),
+    plugin: Sequence[str | os.PathLike[str]] = (),
+    wait_for: Sequence[str] = (),
 ) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
@@ -87,7 +96,11 @@ def launch(
     time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients the run
     waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable:
     devices that are left out, "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal
-    values. args: further options of `ruedo run`. url: None takes a local socket, which no other
+    values. duration: s of sim time after which the run ends. paused: it starts so, at step 0.
+    record: the file of a log. snapshots: the folder for snapshot() and restore(). drive: drives by
+    wheel joints, "rover=left_joint,right_joint". fault: what goes wrong, "p3at/lrf:freeze@3".
+    plugin: shared libraries with sensors or drives. wait_for: inputs that the run waits for where a
+    command is due, "p3at/velocity@10". args: further options of `ruedo run`. url: None takes a local socket, which no other
     user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name:
     of this client. timeout: s of real time until the world is loaded. verbose: show what the server
     prints (else it is shown in the errors alone). view: the web console, which show() of the
@@ -96,6 +109,16 @@ def launch(
     timeout = arguments.number("timeout", timeout)
     name = arguments.client_name(name)
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
+    options += _more_options(duration, paused, record, snapshots)
+    for option, several in (
+        ("drive", drive),
+        ("fault", fault),
+        ("plugin", plugin),
+        ("wait_for", wait_for),
+    ):
+        _check_list(option, several)
+        for one in several:
+            options += [f"--{option.replace('_', '-')}", os.fspath(one)]
     options += ["--allow-absolute"] * isinstance(world, World)  # this program chose its files
     port = _free_port() if view else 0
     options += ["--view", str(port)] if port else []
@@ -181,6 +204,34 @@ def _free_port() -> int:
         return port
 
 
+def _check_list(name: str, several: Any) -> None:
+    if isinstance(several, (str, bytes)):
+        raise TypeError(
+            f"{name} is {arguments.shown(several)}: it must be a list, {name}={str(several).split()!r}"
+        )
+    if not isinstance(several, Iterable):
+        raise TypeError(f"{name} is a list of texts, not {arguments.shown(several)}")
+    for one in several:
+        if not isinstance(one, (str, os.PathLike)):
+            raise TypeError(f"{name} is a list of texts; {arguments.shown(one)} is none")
+
+
+def _more_options(
+    duration: float | None,
+    paused: bool,
+    record: str | os.PathLike[str] | None,
+    snapshots: str | os.PathLike[str] | None,
+) -> list[str]:
+    """Of `ruedo run`."""
+    options = ["--paused"] * arguments.switch("paused", paused)
+    if duration is not None:
+        options += ["--duration", str(arguments.finite("duration", duration, 0.0))]
+    for name, place in (("record", record), ("snapshots", snapshots)):
+        if place is not None:
+            options += [f"--{name}", arguments.path(name, place)]
+    return options
+
+
 def _options(
     seed: int | None,
     rate: float | str | None,
@@ -193,15 +244,7 @@ def _options(
 ) -> list[str]:
     """Of `ruedo run`."""
     for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
-        if isinstance(several, (str, bytes)):
-            raise TypeError(
-                f"{name} is {arguments.shown(several)}: it must be a list, {name}={str(several).split()!r}"
-            )
-        if not isinstance(several, Iterable):
-            raise TypeError(f"{name} is a list of texts, not {arguments.shown(several)}")
-        for one in several:
-            if not isinstance(one, (str, os.PathLike)):
-                raise TypeError(f"{name} is a list of texts; {arguments.shown(one)} is none")
+        _check_list(name, several)
     if set is not None and not isinstance(set, Mapping):
         raise TypeError(
             f"set is {arguments.shown(set)}: it must be a dict, such as {{'p3at/lrf.rate': 20}}"

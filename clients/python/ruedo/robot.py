@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -13,20 +14,27 @@ import numpy as np
 
 from . import lcmtypes
 from .arguments import check_callback, finite, number, numbers, shown, text
-from .errors import NotSupported, UnknownName
+from .errors import NoServer, NotSupported, UnknownName
 from .geometry import Floats, Transform
 from .joints import JointStream, limits_of
 from .joints import message as joint_message
 from .lockstep import Command
 from .motion import Driver, Motion
 from .samples import (
+    AirPressure,
+    AirSpeed,
+    Altimeter,
     CameraInfo,
     Collisions,
     Contact,
+    ForceTorque,
     Image,
     Imu,
     LidarScan,
+    LogicalCamera,
+    Magnetometer,
     MotionStatus,
+    NavSat,
     Odometry,
     OdometryTwist,
     Pose,
@@ -218,6 +226,37 @@ class Robot:
         return self._first("imu_t", "IMU")
 
     @property
+    def gps(self) -> Device[NavSat]:
+        """The first satellite receiver; ``fix.enu(origin)`` is its place in metres."""
+        return self._first("navsat_t", "satellite receiver")
+
+    @property
+    def magnetometer(self) -> Device[Magnetometer]:
+        return self._first("magnetometer_t", "magnetometer")
+
+    @property
+    def altimeter(self) -> Device[Altimeter]:
+        return self._first("altimeter_t", "altimeter")
+
+    @property
+    def air_pressure(self) -> Device[AirPressure]:
+        """The first barometer."""
+        return self._first("air_pressure_t", "barometer")
+
+    @property
+    def air_speed(self) -> Device[AirSpeed]:
+        """The first Pitot tube."""
+        return self._first("air_speed_t", "air speed sensor")
+
+    @property
+    def force_torque(self) -> Device[ForceTorque]:
+        return self._first("force_torque_t", "force-torque sensor")
+
+    @property
+    def logical_camera(self) -> Device[LogicalCamera]:
+        return self._first("logical_camera_t", "logical camera")
+
+    @property
     def contact(self) -> Device[Contact]:
         """The first bumper."""
         return self._first("contact_t", "contact sensor")
@@ -262,11 +301,25 @@ class Robot:
 
     def set_velocity(self, v: float, omega: float, vy: float = 0.0) -> None:
         """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
-        command of any kind: the command is repeated in the background, so that the watchdog does
-        not stop the robot. vy: m/s to the left, of a robot that moves sideways. Raises NotSupported
-        for another robot, and in lockstep, as all that drives at once."""
+        command of any kind: this program repeats it in the background, so that the watchdog does
+        not stop the robot. It lapses `watchdog` s of sim time after the program has ended or was
+        stopped. driving() shows in the program how long that is to last. vy: m/s to the left, of a
+        robot that moves sideways. Raises NotSupported for another robot, and in lockstep, as all
+        that drives at once."""
         command = self.velocity_command(v, omega, vy)
         self._driver("velocity_command(v, omega)").keep_sending(command.channel, command.data)
+
+    @contextlib.contextmanager
+    def driving(self, v: float, omega: float, vy: float = 0.0) -> Iterator[Robot]:
+        """``with robot.driving(0.3, 0.0): ...`` drives as set_velocity() does for as long as the
+        block lasts, however it ends, and then stops.
+        """
+        self.set_velocity(v, omega, vy)
+        try:
+            yield self
+        finally:
+            with contextlib.suppress(NoServer):
+                self.stop()
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next

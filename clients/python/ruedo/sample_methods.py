@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from . import notebook
 from .arguments import shown
-from .errors import NotSupported, UnknownName
+from .errors import UnknownName
 from .geometry import Floats, Placed, Transform, between, transformed
 
 if TYPE_CHECKING:
-    from .samples import ContactPoint, Odometry, Pose
+    from .samples import ContactPoint, NavSat, Odometry, Pose
 
 
 class ScanMethods:
@@ -48,12 +48,7 @@ class ScanMethods:
         """Draws the scan, x upwards as the robot looks, y to the left. axes: matplotlib's; None:
         new ones. Returns them. Needs matplotlib.
         """
-        if axes is None:
-            try:
-                from matplotlib import pyplot
-            except ImportError:
-                raise NotSupported("plot() needs matplotlib: pip install matplotlib") from None
-            axes = pyplot.subplots()[1]
+        axes = notebook.axes_of(axes)
         points = self.points()
         axes.plot(-points[:, 1], points[:, 0], ".", markersize=3)
         axes.plot(0.0, 0.0, "^", color="tab:red")
@@ -201,6 +196,54 @@ class ImageMethods:
             head = "P5" if self.format == "gray" else "P6"
             content = f"{head} {self.width} {self.height} 255\n".encode() + self.array().tobytes()
         Path(path).write_bytes(content)
+
+
+class ImuMethods:
+    orientation: Floats
+
+    @property
+    def heading(self) -> float:
+        """rad, counter-clockwise from the world's x axis to the device's, in (-pi, pi]."""
+        return Transform(np.zeros(3), self.orientation).heading
+
+
+class NavSatMethods:
+    latitude_deg: float
+    longitude_deg: float
+    altitude: float
+
+    def enu(self, origin: NavSat) -> Floats:
+        """(3,) m to the east, to the north and upwards of another fix, usually the first: on the
+        plane that touches the WGS 84 ellipsoid's parallel surface there.
+        """
+        latitude, longitude = math.radians(origin.latitude_deg), math.radians(origin.longitude_deg)
+        north = math.sin(latitude), math.cos(latitude)
+        east = math.sin(longitude), math.cos(longitude)
+        to_enu = np.array(
+            [
+                [-east[0], east[1], 0.0],
+                [-north[0] * east[1], -north[0] * east[0], north[1]],
+                [north[1] * east[1], north[1] * east[0], north[0]],
+            ]
+        )
+        made: Floats = to_enu @ (_earth_centred(self) - _earth_centred(origin))
+        return made
+
+
+def _earth_centred(fix: NavSatMethods) -> Floats:
+    """Earth-centred, Earth-fixed coordinates, m: WGS 84 (NIMA TR8350.2, eq. 4-14)."""
+    axis, flattening = 6378137.0, 1.0 / 298.257223563
+    squared = flattening * (2.0 - flattening)
+    latitude, longitude = math.radians(fix.latitude_deg), math.radians(fix.longitude_deg)
+    normal = axis / math.sqrt(1.0 - squared * math.sin(latitude) ** 2)
+    along = (normal + fix.altitude) * math.cos(latitude)
+    return np.array(
+        [
+            along * math.cos(longitude),
+            along * math.sin(longitude),
+            ((1.0 - squared) * normal + fix.altitude) * math.sin(latitude),
+        ]
+    )
 
 
 class JointsMethods:

@@ -314,6 +314,19 @@ class Simulation(Requests):
             raise NotSupported("this server does not accept markers")
         self._connection.bus.publish(channel.name, message.encode())
 
+    def publish(self, channel: str, message: Any) -> None:
+        """Sends a message to the server and to whoever listens at `url`: an object of a class that
+        lcm-gen made, or its bytes. A command of the server's goes to the channel that its
+        documentation names ("p3at/velocity"); in lockstep it belongs to step().
+        """
+        self._connection.check_open()
+        data = message.encode() if hasattr(message, "encode") else message
+        if isinstance(message, str) or not isinstance(data, bytes):
+            raise TypeError(
+                f"message is {arguments.shown(message)}: it must be of lcm-gen's, or its bytes"
+            )
+        self._connection.bus.publish(arguments.text("channel", channel), data)
+
     def restore(self, name: str) -> State:
         state = super().restore(name)
         self._connection.clock.reset(state.utime)

@@ -2,6 +2,7 @@ import ruedo.Body;
 import ruedo.Joint;
 import ruedo.JointMode;
 import ruedo.Joints;
+import ruedo.NavSat;
 import ruedo.Observations;
 import ruedo.Pose;
 import ruedo.Robot;
@@ -11,6 +12,7 @@ import ruedo.Scan;
 import ruedo.Simulation;
 import ruedo.Synchronised;
 import ruedo.Transform;
+import ruedo.lcmtypes.velocity_command_t;
 
 import java.util.ArrayList;
 import java.util.List;
@@ -195,6 +197,32 @@ public final class Api {
         say("wall", wall);
     }
 
+    private static void driving(Simulation sim) {
+        Robot robot = sim.robot("p3at");
+        double begin = robot.pose().latest(PATIENCE).x();
+        try (Robot.Driving driving = robot.driving(0.3, 0.0)) {
+            sim.sleep(driving == null ? 0.0 : 2.0);
+        }
+        double speed = 1.0;
+        while (speed > 0.0) speed = robot.motion().next(PATIENCE).v;
+        say("went", robot.pose().next(PATIENCE).x() - begin > 0.3);
+        velocity_command_t command = new velocity_command_t();
+        command.vx = 0.1;
+        sim.publish("p3at/velocity", command);
+        double fastest = 0.0;
+        while (fastest == 0.0 || robot.motion().latest(PATIENCE).v > 0.0)
+            fastest = Math.max(fastest, robot.motion().next(PATIENCE).v);
+        say("published", fastest); // it lapsed: nobody repeats it
+    }
+
+    private static void fixes(Simulation sim) {
+        NavSat first = sim.robot("here").gps().latest(PATIENCE);
+        double[] enu = sim.robot("there").gps().latest(PATIENCE).enu(first);
+        say("enu", enu[0], enu[1], enu[2]);
+        say("heading", sim.robot("there").imu().latest(PATIENCE).heading());
+        attempt("none", () -> sim.robot("here").magnetometer());
+    }
+
     public static void main(String[] args) {
         try (Simulation sim = Ruedo.connect(args[0], "api", 60.0)) {
             switch (args[1]) {
@@ -209,6 +237,12 @@ public final class Api {
                     break;
                 case "geometry":
                     geometry(sim);
+                    break;
+                case "driving":
+                    driving(sim);
+                    break;
+                case "fixes":
+                    fixes(sim);
                     break;
                 case "joints_in_lockstep":
                     jointsInLockstep(sim);

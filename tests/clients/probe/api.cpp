@@ -171,6 +171,30 @@ void geometry(const rc::Simulation& sim) {
   say("wall", wall);
 }
 
+void driving(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("p3at");
+  const double begin = robot.pose().latest(kPatience).x();
+  {
+    const rc::Driving driving = robot.driving(0.3, 0.0);
+    sim.sleep(2.0);
+  }
+  while (robot.motion().next(kPatience).v > 0.0) continue;
+  say("went", robot.pose().next(kPatience).x() - begin > 0.3);
+  sim.publish("p3at/velocity", robot.velocity_command(0.1, 0.0).bytes);
+  double fastest = 0.0;
+  while (fastest == 0.0 || robot.motion().latest(kPatience).v > 0.0)
+    fastest = std::max(fastest, robot.motion().next(kPatience).v);
+  say("published", fastest);  // it lapsed: nobody repeats it
+}
+
+void fixes(const rc::Simulation& sim) {
+  const rc::NavSat first = sim.robot("here").gps().latest(kPatience);
+  const rc::Vector3 enu = sim.robot("there").gps().latest(kPatience).enu(first);
+  say("enu", enu[0], enu[1], enu[2]);
+  say("heading", sim.robot("there").imu().latest(kPatience).heading());
+  attempt("none", [&] { (void)sim.robot("here").magnetometer(); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -181,6 +205,8 @@ int main(int argc, char** argv) {
       {"in_step", [&] { in_step(sim); }},
       {"bodies", [&] { bodies(sim); }},
       {"geometry", [&] { geometry(sim); }},
+      {"driving", [&] { driving(sim); }},
+      {"fixes", [&] { fixes(sim); }},
       {"joints_in_lockstep", [&] { joints_in_lockstep(sim); }},
   };
   commands.at(argv[2])();

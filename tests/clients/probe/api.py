@@ -120,6 +120,30 @@ def geometry(sim):
     say("wall", max(float(one[0]) for one in ahead if abs(one[1]) < 1.0))
 
 
+def driving(sim):
+    robot = sim.robot("p3at")
+    begin = robot.pose.latest(PATIENCE)
+    with robot.driving(0.3, 0.0):
+        sim.sleep(2.0)
+    while robot.motion.next(PATIENCE).v > 0.0:
+        pass
+    say("went", robot.pose.next(PATIENCE).x - begin.x > 0.3)
+    command = ruedo.lcmtypes.velocity_command_t()
+    command.vx = 0.1
+    sim.publish("p3at/velocity", command)
+    fastest = 0.0
+    while fastest == 0.0 or robot.motion.latest(PATIENCE).v > 0.0:
+        fastest = max(fastest, robot.motion.next(PATIENCE).v)
+    say("published", fastest)  # it lapsed: nobody repeats it
+
+
+def fixes(sim):
+    first, second = (sim.robot(name).gps.latest(PATIENCE) for name in ("here", "there"))
+    say("enu", *map(float, second.enu(first)))
+    say("heading", sim.robot("there").imu.latest(PATIENCE).heading)
+    attempt("none", lambda: sim.robot("here").magnetometer)
+
+
 def main():
     url, command, *rest = sys.argv[1:]
     with ruedo.connect(url, name="api", timeout=60.0) as sim:

@@ -11,6 +11,7 @@ public final class LaunchOptions {
     List<String> spawn = List.of();
     List<String> disable = List.of();
     final List<String> set = new ArrayList<>(); // KEY=VALUE
+    final List<String> more = new ArrayList<>(); // as the command line has them
     boolean noise = true;
     String text = "";
     List<String> args = List.of();
@@ -58,6 +59,52 @@ public final class LaunchOptions {
     /** False: ideal values. */
     public LaunchOptions noise(boolean noise) {
         this.noise = noise;
+        return this;
+    }
+
+    /** s of sim time after which the run ends. */
+    public LaunchOptions duration(double seconds) {
+        return more("--duration", Double.toString(seconds));
+    }
+
+    /** It starts paused, at step 0. */
+    public LaunchOptions paused() {
+        more.add("--paused");
+        return this;
+    }
+
+    /** The file of a log. */
+    public LaunchOptions record(String file) {
+        return more("--record", file);
+    }
+
+    /** The folder for snapshot() and restore(). */
+    public LaunchOptions snapshots(String folder) {
+        return more("--snapshots", folder);
+    }
+
+    /** Drives by wheel joints: "rover=left_joint,right_joint". */
+    public LaunchOptions drive(String... drives) {
+        return more("--drive", drives);
+    }
+
+    /** What goes wrong: "p3at/lrf:freeze@3". */
+    public LaunchOptions fault(String... faults) {
+        return more("--fault", faults);
+    }
+
+    /** Shared libraries with sensors or drives. */
+    public LaunchOptions plugin(String... files) {
+        return more("--plugin", files);
+    }
+
+    /** Inputs that the run waits for where a command is due: "p3at/velocity@10". */
+    public LaunchOptions waitFor(String... inputs) {
+        return more("--wait-for", inputs);
+    }
+
+    private LaunchOptions more(String option, String... values) {
+        for (String value : values) more.addAll(List.of(option, value));
         return this;
     }
 

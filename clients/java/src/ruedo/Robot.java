@@ -142,6 +142,48 @@ public final class Robot {
         return (Device<Imu>) first("imu_t", "IMU");
     }
 
+    /** The first satellite receiver; {@link NavSat#enu} is its place in metres. */
+    @SuppressWarnings("unchecked")
+    public Device<NavSat> gps() {
+        return (Device<NavSat>) first("navsat_t", "satellite receiver");
+    }
+
+    /** The first magnetometer. */
+    @SuppressWarnings("unchecked")
+    public Device<Magnetometer> magnetometer() {
+        return (Device<Magnetometer>) first("magnetometer_t", "magnetometer");
+    }
+
+    /** The first altimeter. */
+    @SuppressWarnings("unchecked")
+    public Device<Altimeter> altimeter() {
+        return (Device<Altimeter>) first("altimeter_t", "altimeter");
+    }
+
+    /** The first barometer. */
+    @SuppressWarnings("unchecked")
+    public Device<AirPressure> airPressure() {
+        return (Device<AirPressure>) first("air_pressure_t", "barometer");
+    }
+
+    /** The first Pitot tube. */
+    @SuppressWarnings("unchecked")
+    public Device<AirSpeed> airSpeed() {
+        return (Device<AirSpeed>) first("air_speed_t", "air speed sensor");
+    }
+
+    /** The first force-torque sensor. */
+    @SuppressWarnings("unchecked")
+    public Device<ForceTorque> forceTorque() {
+        return (Device<ForceTorque>) first("force_torque_t", "force-torque sensor");
+    }
+
+    /** The first logical camera. */
+    @SuppressWarnings("unchecked")
+    public Device<LogicalCamera> logicalCamera() {
+        return (Device<LogicalCamera>) first("logical_camera_t", "logical camera");
+    }
+
     /** The first bumper. */
     @SuppressWarnings("unchecked")
     public Device<Contact> contact() {
@@ -259,8 +301,9 @@ public final class Robot {
 
     /**
      * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
-     * command of any kind: the command is repeated in the background, so that the watchdog does not
-     * stop the robot. Throws NotSupported for a robot without a drive, and in lockstep, as all that
+     * command of any kind: this program repeats it in the background, so that the watchdog does not
+     * stop the robot. It lapses watchdog() s of sim time after the program has ended or was
+     * stopped; {@link #driving} shows in the program how long that is to last. Throws NotSupported for a robot without a drive, and in lockstep, as all that
      * drives at once.
      */
     public void setVelocity(double v, double omega) {
@@ -274,6 +317,28 @@ public final class Robot {
     public void setVelocity(double v, double omega, double vy) {
         Command command = velocityCommand(v, omega, vy);
         driver("velocityCommand(v, omega)").keepSending(command.channel, command.data);
+    }
+
+    /** The robot drives until close(), from {@link Robot#driving}. */
+    public interface Driving extends AutoCloseable {
+        /** The robot stops. */
+        @Override
+        void close();
+    }
+
+    /**
+     * As {@link #setVelocity}, for as long as a block lasts; then the robot stops: try (var driving
+     * = robot.driving(0.3, 0.0)) { ... }.
+     */
+    public Driving driving(double v, double omega) {
+        setVelocity(v, omega);
+        return () -> {
+            try {
+                stop();
+            } catch (RuedoException.NoServer error) {
+                // the simulation was closed
+            }
+        };
     }
 
     /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */

@@ -105,6 +105,7 @@ final class ServerProcess {
         for (String device : options.disable) words.addAll(List.of("--disable", device));
         for (String setting : options.set) words.addAll(List.of("--set", setting));
         if (!options.noise) words.add("--no-noise");
+        words.addAll(options.more);
         words.addAll(options.args);
         return words;
     }

@@ -443,6 +443,20 @@ public final class Simulation extends Requests implements AutoCloseable {
         markers(layer, markers, "");
     }
 
+    /**
+     * Sends a message to the server and to whoever listens at {@link #url}: its bytes as LCM
+     * encodes it, on a channel such as "p3at/velocity". In lockstep commands belong to step().
+     */
+    public void publish(String channel, byte[] message) {
+        checkOpen();
+        bus.publish(channel, message);
+    }
+
+    /** The same with an object of one of ruedo.lcmtypes, or of lcm-gen's. */
+    public void publish(String channel, ruedo.lcmtypes.Message message) {
+        publish(channel, Bus.encode(message));
+    }
+
     @Override
     public State restore(String name) {
         State state = super.restore(name);
