@@ -254,7 +254,8 @@ def test_a_misspelt_joint_refuses_its_step(language, joints, wrong):
     if wrong:
         assert said.one("joints") == (
             "RequestError: GRANT: command 0 (c/joint_command): c has no joint 'hand_jiont' "
-            "that takes commands; it has turret_joint, upper_arm_joint, forearm_joint, hand_joint"
+            "that takes commands; it has turret_joint, upper_arm_joint, forearm_joint, hand_joint, "
+            "left_finger_joint, right_finger_joint"
         )
     else:
         assert said.one("joints") == "none"

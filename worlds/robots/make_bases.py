@@ -48,6 +48,8 @@ def shape(kind, pose, geometry, rgb=None, name="body"):
 
 
 SLIDES = "<surface><friction><ode><mu>0</mu><mu2>0</mu2></ode></friction></surface>"
+PADS = "<friction><ode><mu>1.5</mu><mu2>1.5</mu2></ode></friction>"
+SERVO = "<ruedo:position_gain>20</ruedo:position_gain>"
 GREY, BLUE, RED, GREEN, DARK = (
     (0.6, 0.6, 0.62),
     (0.16, 0.33, 0.6),
@@ -355,12 +357,28 @@ def segment(name, parent, at, length, mass, axis, most, effort):
     return link + (
         f'    <joint name="{name}_joint" type="revolute"><parent>{parent}</parent><child>{name}</child><axis><xyz>{axis}</xyz>'
         f"<limit><lower>{number(-most)}</lower><upper>{number(most)}</upper><effort>{number(effort)}</effort><velocity>2</velocity></limit>"
-        f"<dynamics><damping>0.1</damping></dynamics></axis></joint>\n"
+        f"<dynamics><damping>0.1</damping></dynamics>{SERVO}</axis></joint>\n"
+    )
+
+
+def finger(side, at):
+    """A finger that slides inwards from 0, on the hand: 4 cm at most, with 20 N."""
+    x, y, z = at
+    size, name = (0.03, 0.01, 0.07), f"{side}_finger"
+    pads = f"<surface>{PADS}</surface>"
+    text = f'    <link name="{name}"><pose>{numbers((x, y, z, 0, 0, 0))}</pose>\n      <inertial><pose>0 0 0.035 0 0 0</pose><mass>0.1</mass>'
+    text += f"<inertia>{inertia(0.1, *size)}</inertia></inertial>\n"
+    box = f"<box><size>{numbers(size)}</size></box>"
+    text += shape(pads, (0, 0, 0.035, 0, 0, 0), box, DARK, "pad") + "    </link>\n"
+    return text + (
+        f'    <joint name="{name}_joint" type="prismatic"><parent>hand</parent><child>{name}</child>'
+        f"<axis><xyz>0 {'-1' if y > 0 else '1'} 0</xyz><limit><lower>0</lower><upper>0.04</upper><effort>20</effort>"
+        f"<velocity>0.1</velocity></limit>{SERVO}</axis></joint>\n"
     )
 
 
 def carrier():
-    """An arm of four joints on a base of two wheels; joint_command moves it."""
+    """An arm of four joints and a gripper on a base of two wheels; joint_command moves it."""
     text = round_base(25, 0.26, 0.03, 0.24, 0.08, 0.4, sensors(0.34, 0.18))
     parent, z = "base_link", 0.27
     for name, length, mass, axis, most, effort in (
@@ -371,11 +389,12 @@ def carrier():
     ):
         text += segment(name, parent, (-0.06, 0, z), length, mass, axis, most, effort)
         parent, z = name, z + length
+    text += finger("left", (-0.06, 0.045, z)) + finger("right", (-0.06, -0.045, z))
     text += drive(
         "differential",
         [("left_joint", "left_joint"), ("right_joint", "right_joint")] + limits(0.8, 1.5, 0.6, 3),
     )
-    return "An arm of four joints on a base of two wheels.", text
+    return "An arm of four joints and a gripper on a base of two wheels.", text
 
 
 ROBOTS = {

@@ -82,17 +82,17 @@ class Joint:
 class JointStream(Stream[Joints]):
     """The states of a robot's joints, and the joints themselves by their names."""
 
-    robot: Robot
+    _owner: Robot
 
     def __getitem__(self, name: str) -> Joint:
         """Raises UnknownName, which lists the joints."""
-        limits = limits_of(self._connection, self.robot.name)
-        return Joint(self.robot, limits, limits.names.index(checked(self.robot.name, limits, name)))
+        limits = limits_of(self._connection, self._owner.name)
+        return Joint(self._owner, limits, limits.names.index(checked(self._owner.name, limits, name)))
 
     @property
     def names(self) -> list[str]:
         """Of all joints, in the order of the samples."""
-        return list(limits_of(self._connection, self.robot.name).names)
+        return list(limits_of(self._connection, self._owner.name).names)
 
 
 def limits_of(connection: Connection, robot: str) -> JointLimits:

@@ -30,6 +30,7 @@ from .samples import (
     ForceTorque,
     Image,
     Imu,
+    Joints,
     LidarScan,
     LogicalCamera,
     Magnetometer,
@@ -105,6 +106,13 @@ class Camera(Device[Image]):
 
     def _part(self, part: str) -> Stream[Any]:
         return _camera_part(self._owner, self.robot, self.name, part)
+
+
+class JointDevice(JointStream, Device[Joints]):
+    """The states of a robot's joints."""
+
+
+_DEVICES: dict[str, type[Device[Any]]] = {"image_t": Camera, "joint_state_t": JointDevice}
 
 
 class Robot:
@@ -295,6 +303,7 @@ class Robot:
         """The states of its joints, and each of them by its name: ``robot.joints["elbow"]``."""
         stream = self._stream("joint_state_t", "joints")
         assert isinstance(stream, JointStream)
+        stream._owner = self
         return stream
 
     # Driving.
@@ -610,7 +619,7 @@ class Robot:
         channel = self._connection.info.device_channels.get((self.name, info.name))
         if channel is None:
             return None
-        make = Camera if channel.type == "image_t" else Device
+        make = _DEVICES.get(channel.type, Device)
         stream = self._connection.streams.get(
             channel, partial(make, self._connection, self.name, info, channel)
         )
@@ -635,10 +644,7 @@ class Robot:
         raise UnknownName(f"{self.name} publishes no {what}")
 
     def _plain(self, channel: Any, form: Form | None = None) -> Stream[Any]:
-        stream = _plain(self._connection, channel, form)
-        if isinstance(stream, JointStream):
-            stream.robot = self
-        return stream
+        return _plain(self._connection, channel, form)
 
 
 def _plain(connection: Connection, channel: Any, form: Form | None = None) -> Stream[Any]:
