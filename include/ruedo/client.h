@@ -911,8 +911,17 @@ class [[nodiscard]] Simulation : public Requests {
   /// @param z m, world
   void set_pose(const std::string& name, double x, double y, double heading = 0.0,
                 double z = 0.0) const;
+  /// As an Engine's: keeps the state, in the folder that the server was started with
+  /// (LaunchOptions::snapshots).
+  /// @param name of the snapshot
+  /// @return what restore() takes
+  [[nodiscard]] State save(const std::string& name = "saved") const { return snapshot(name); }
   /// @copydoc Requests::restore
   State restore(const std::string& name) const;
+  /// The same with what save() returned.
+  /// @param saved by save()
+  /// @return the state as it is then
+  State restore(const State& saved) const { return restore(saved.name); }
   /// @copydoc Requests::quit
   void quit() const;
   /// @}

@@ -36,6 +36,7 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .bodies import Body, Twist
     from .callbacks import Subscription
     from .errors import (
+        BadWorld,
         LaunchError,
         LeaseLost,
         MotionError,
@@ -85,6 +86,7 @@ def __getattr__(name: str) -> object:
 
 
 __all__ = [
+    "BadWorld",
     "Body",
     "Camera",
     "Command",

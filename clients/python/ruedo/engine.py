@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from .arguments import (
     word,
 )
 from .arguments import text as checked_text
+from .errors import BadWorld, UnknownField
 from .world import World
 
 if TYPE_CHECKING:
@@ -82,6 +83,23 @@ class SavedWorld(Saved):
         return f"<ruedo.SavedWorld: world {self.world} at {self.time:g} s>"
 
 
+class TimeOfCopies(float):
+    """s, of copy 0; called with an index, of that copy."""
+
+    _of: Callable[[int], float]
+
+    def __new__(cls, time: float, of: Callable[[int], float]) -> Self:
+        made = super().__new__(cls, time)
+        made._of = of
+        return made
+
+    def __call__(self, world: int = 0) -> float:
+        return self._of(world)
+
+    def __reduce__(self) -> Any:
+        return float, (float(self),)
+
+
 class Engine:
     """Copies of one world.
 
@@ -98,8 +116,9 @@ class Engine:
     or wrong as it is. allow_absolute: absolute paths in files may lead out of the folders that are
     searched, as they may in a :class:`World`.
 
-    Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
-    is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
+    Raises BadWorld, which is both a ValueError and the LaunchError that launch() raises, for what
+    is wrong in the file, with file, line, value and what is allowed; ValueError for an argument;
+    OSError for what the machine lacks. Not for several threads at once; ``step`` lets
     other Python threads run. A process that was forked may use engines, but draws no pictures where
     the one before had drawn some: OSError.
     """
@@ -142,7 +161,7 @@ class Engine:
         seed = whole("seed", seed, 0, MOST_SEED - worlds + 1)
         settings = named("set", set, '{"p3at/lrf.update_rate": 10}')
         draws = named("randomize", randomize, '{"p3at.x": "uniform(-2, 2)"}')
-        self._core = _engine.Engine(
+        self._core = _made(
             os.fsencode(world),
             text=text,
             worlds=worlds,
@@ -176,9 +195,14 @@ class Engine:
         return self._robots
 
     @property
-    def dt(self) -> float:
-        """Seconds of sim time in a step."""
+    def step_size(self) -> float:
+        """Length of a step, s."""
         return self._step_us * 1e-6
+
+    @property
+    def dt(self) -> float:
+        """Deprecated: `step_size`, as a Simulation calls it."""
+        return self.step_size
 
     @property
     def devices(self) -> list[tuple[str, str, str]]:
@@ -244,8 +268,12 @@ class Engine:
         """The number of the state that a copy is in; 0 after a reset."""
         return self._core.current_step(self._checked(world))
 
-    def time(self, world: int = 0) -> float:
-        """Sim time of a copy, s."""
+    @property
+    def time(self) -> TimeOfCopies:
+        """Sim time of copy 0, s, as a Simulation has it; ``engine.time(i)`` is copy i's."""
+        return TimeOfCopies(self.steps(0) * self._step_us * 1e-6, self._time_of)
+
+    def _time_of(self, world: int) -> float:
         return self.steps(world) * self._step_us * 1e-6
 
     def state_hash(self, world: int = 0) -> int:
@@ -267,7 +295,10 @@ class Engine:
         device, dot, field = checked_text("a field", name).rpartition(".")
         if not dot or not device or not field or len(name) > _MOST_FIELD:
             raise ValueError(f"{shown(name)} is not a DEVICE.FIELD; for example 'lrf.ranges'")
-        values: NDArray[Any] = self._core.observe(device, field)
+        try:
+            values: NDArray[Any] = self._core.observe(device, field)
+        except ValueError as error:
+            raise UnknownField(str(error)) from None
         return values
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -291,7 +322,7 @@ class Engine:
         """
         if not hasattr(n, "__index__"):
             raise TypeError(
-                f"n is a whole number of steps, not {shown(n)}; a step is {self.dt:g} s"
+                f"n is a whole number of steps, not {shown(n)}; a step is {self.step_size:g} s"
             )
         count = whole("n", n, 1)
         which = None
@@ -383,7 +414,7 @@ class Engine:
         """
         index = self._checked(world)
         saved = self._core.save(index)
-        return SavedWorld(saved, index, self._seeds[index], self.steps(index), self.time(index))
+        return SavedWorld(saved, index, self._seeds[index], self.steps(index), self._time_of(index))
 
     def restore(
         self,
@@ -438,7 +469,7 @@ class Engine:
         )
 
     def __repr__(self) -> str:
-        return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.dt * 1e3:g} ms>"
+        return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.step_size * 1e3:g} ms>"
 
     def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
         given = array("commands are numbers, (m/s, rad/s) for each robot of each world", commands)
@@ -480,6 +511,14 @@ class Engine:
                 )
             return [int(i) for i in np.flatnonzero(given)]
         return [self._checked(i) for i in np.atleast_1d(given)]
+
+
+def _made(world: bytes, **options: Any) -> Any:
+    """Raises BadWorld."""
+    try:
+        return _engine.Engine(world, **options)
+    except ValueError as error:
+        raise BadWorld(str(error)) from None
 
 
 def _bytes_of(message: Any) -> bytes:

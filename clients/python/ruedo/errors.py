@@ -39,8 +39,16 @@ class LaunchError(RuedoError):
     """A private server could not be started."""
 
 
+class BadWorld(LaunchError, ValueError):
+    """The world of an Engine cannot be loaded: what is wrong, with file and line."""
+
+
 class UnknownName(RuedoError, LookupError):
     """There is no robot, device or channel of that name; the text lists those that exist."""
+
+
+class UnknownField(UnknownName, ValueError):
+    """An Engine has no such field; the text lists those that exist."""
 
 
 class Timeout(RuedoError, TimeoutError):

@@ -327,13 +327,19 @@ class Simulation(Requests):
             )
         self._connection.bus.publish(arguments.text("channel", channel), data)
 
-    def restore(self, name: str) -> State:
-        state = super().restore(name)
+    def save(self, name: str = "saved") -> State:
+        """Keeps the state under a name, in the folder that the server was started with
+        (``launch(..., snapshots=folder)``); restore() takes what it returns, as an Engine's does.
+        """
+        return self.snapshot(name)
+
+    def restore(self, name: str | State) -> State:
+        state = super().restore(name.name if isinstance(name, State) else name)
         self._connection.clock.reset(state.utime)
         self._connection.stepper.forget()
         return state
 
-    restore.__doc__ = Requests.restore.__doc__
+    restore.__doc__ = f"{Requests.restore.__doc__}\n        It takes what save() returned, too."
 
     def quit(self) -> None:
         with contextlib.suppress(RunEnded):  # its last word may come before the reply, or without

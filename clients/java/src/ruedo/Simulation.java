@@ -457,6 +457,19 @@ public final class Simulation extends Requests implements AutoCloseable {
         publish(channel, Bus.encode(message));
     }
 
+    /**
+     * Keeps the state under a name, in the folder that the server was started with ({@link
+     * LaunchOptions#snapshots}); restore() takes what it returns.
+     */
+    public State save(String name) {
+        return snapshot(name);
+    }
+
+    /** Puts the world back to what save() returned. */
+    public State restore(State saved) {
+        return restore(saved.name);
+    }
+
     @Override
     public State restore(String name) {
         State state = super.restore(name);

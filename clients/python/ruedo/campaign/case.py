@@ -146,8 +146,8 @@ class Runner:
     def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> bool:
         """Whether the controller has commanded anything, or said that it is done."""
         made = what["controller"]
-        steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
-        last = max(1, round(what["limits"]["duration"] / engine.dt))
+        steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.step_size)))
+        last = max(1, round(what["limits"]["duration"] / engine.step_size))
         with forks_end():
             thing = Function(made["python"], self._folder).load()
             controller = make_controller(thing, what["parameters"])

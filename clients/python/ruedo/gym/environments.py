@@ -188,11 +188,11 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                 "render_mode 'human' repeats what robots with a drive do; there is none"
             )
         seconds = self.task.action_seconds
-        self._steps = round(seconds / self._engine.dt)
-        if self._steps < 1 or abs(self._steps * self._engine.dt - seconds) > 1e-9:
+        self._steps = round(seconds / self._engine.step_size)
+        if self._steps < 1 or abs(self._steps * self._engine.step_size - seconds) > 1e-9:
             raise ValueError(
                 f"{type(self.task).__name__}.action_seconds is {shown(seconds)}: it must be a multiple "
-                f"of the world's step, {self._engine.dt:g} s"
+                f"of the world's step, {self._engine.step_size:g} s"
             )
         self._scenes = [scene] * self.num_envs
         self.task.engine, self.task.num_envs = self._engine, self.num_envs

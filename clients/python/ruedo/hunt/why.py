@@ -349,9 +349,9 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
         clean = 0
         for moment in _moments(failed_s):
             engine.reset(seed=[recorded.seed] * len(MANOEUVRES))
-            recorded.replay(engine, round(moment / engine.dt))
+            recorded.replay(engine, round(moment / engine.step_size))
             touched = np.zeros(len(MANOEUVRES), bool)
-            pace = max(1, round(0.1 / engine.dt))
+            pace = max(1, round(0.1 / engine.step_size))
             while engine.time() < failed_s + _AFTER_S:
                 engine.step(
                     np.broadcast_to(commands, (len(MANOEUVRES), len(engine.robots), 2)), pace
