@@ -4,9 +4,10 @@ and the expected numbers follow from the worlds below.
 
 import math
 import subprocess
+import sys
 
 import pytest
-from conftest import APIS, HALL, PATIENCE, RUEDO, Said, Server, chosen, free_url, ruedo_run
+from conftest import APIS, BUILD, HALL, PATIENCE, RUEDO, Said, Server, chosen, free_url, ruedo_run
 
 
 @pytest.fixture(params=list(chosen(APIS)))
@@ -214,6 +215,11 @@ def test_launch_has_options_by_name_and_suggests(tmp_path):
         ruedo.launch(HALL, lockstpe=1)
     with pytest.raises(TypeError, match=r"no option worlds_; it has world, |did you mean"):
         ruedo.launch(HALL, worlds_=1)
+    with (
+        pytest.warns(DeprecationWarning, match=r"launch\(set=\.\.\.\) is deprecated: it is settings"),
+        ruedo.launch(HALL, lockstep=1, set={"p3at/lrf.range.max": 3.0}) as sim,
+    ):
+        assert sim.robot("p3at").lrf.range_max == 3.0
     log = str(tmp_path / "run.lcm")
     with ruedo.launch(HALL, rate="max", duration=1.5, record=log, disable=["p3at/camera"]) as sim:
         times = [pose.time for pose in sim.robot("p3at").pose]  # ends with the run
@@ -255,3 +261,30 @@ def test_asyncio_reads_streams_without_threads_of_the_users():
         scans, ticks, poses = asyncio.run(both(sim))
     assert scans == sorted(set(scans)) and poses == sorted(set(poses))
     assert [round(one / 0.1, 6) % 1.0 for one in ticks] == pytest.approx([0.0] * 5)
+
+
+def test_the_jars_messages_are_lcms_too(tmp_path):
+    """LCM's own library publishes one of ruedo.jar, and reads it again, whichever comes first."""
+    import shutil
+    from pathlib import Path
+
+    import lcm
+
+    if "java" not in APIS or not shutil.which("javac"):
+        pytest.skip("no JDK here")
+    own = str(next(Path(lcm.__file__).resolve().parents[2].glob("**/share/java/lcm.jar"), ""))
+    own = own or str(Path(sys.prefix) / "lib/python3/site-packages/share/java/lcm.jar")
+    (tmp_path / "Both.java").write_text(
+        "import lcm.lcm.*; import ruedo.lcmtypes.pose_t; public class Both { public static void main(String[] a)"
+        " throws Exception { LCM lcm = new LCM(\"memq://\"); lcm.subscribe(\"P\", (l, c, in) -> { try {"
+        " System.out.println(new pose_t(in).utime); } catch (java.io.IOException e) { throw new RuntimeException(e); } });"
+        " pose_t pose = new pose_t(); pose.utime = 42; LCMEncodable one = pose; lcm.publish(\"P\", one);"
+        " Thread.sleep(500); System.exit(0); } }"
+    )
+    for both in (f"{BUILD}/java/ruedo.jar:{own}", f"{own}:{BUILD}/java/ruedo.jar"):
+        path = f"{both}:{tmp_path}"
+        subprocess.run(["javac", "-cp", path, "-d", tmp_path, tmp_path / "Both.java"], check=True)
+        done = subprocess.run(
+            ["java", "-cp", path, "Both"], capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert done.stdout == "42\n", done.stderr

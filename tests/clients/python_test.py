@@ -169,7 +169,7 @@ def test_arguments_instead_of_options():
             r"args is '--lockstep 1': it must be a list, args=\['--lockstep', '1'\]",
         ),
         ({"disable": "p3at/camera"}, "disable is 'p3at/camera': it must be a list"),
-        ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
+        ({"settings": ["p3at/lrf.rate=20"]}, "settings is .*: it must be a dict"),
         ({"text": "<sdf/>"}, "either a world or its text"),
         ({"spawn": [5]}, "spawn is a list of texts; 5 is none"),
         ({"spawn": None}, "spawn is a list of texts, not None"),

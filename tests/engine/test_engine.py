@@ -468,7 +468,7 @@ def test_what_is_refused_changes_nothing():
         ({"world": "arena", "worlds": 2.5}, TypeError, "worlds is a whole number, not 2.5"),
         ({"world": "arena", "seed": -1}, ValueError, "seed is -1; allowed are 0 to"),
         ({"world": "arena", "noise": "no"}, TypeError, "noise is True or False, not 'no'"),
-        ({"world": "arena", "set": ["a=1"]}, TypeError, "set is a dict, {"),
+        ({"world": "arena", "settings": ["a=1"]}, TypeError, "settings is a dict, {"),
         ({"world": "arena", "disable": [5]}, TypeError, "disable is a list of texts; 5 is none"),
         ({"text": 5}, TypeError, "text is a world's SDF as text, not 5"),
         ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),

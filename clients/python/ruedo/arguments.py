@@ -8,6 +8,7 @@ import inspect
 import math
 import operator
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
@@ -143,21 +144,33 @@ def finite(what: str, value: Any, low: float = -math.inf) -> float:
     return given
 
 
-def suggesting(call: Callable[P, R]) -> Callable[P, R]:
-    """The call with a TypeError for an option that it does not have, which suggests one."""
-    allowed = [name for name in inspect.signature(call).parameters if name != "self"]
-    shown_name = call.__qualname__.removesuffix(".__init__")
+def options(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A call that raises a TypeError with a suggestion for an option that it does not have.
 
-    @functools.wraps(call)
-    def checked(*given: P.args, **options: P.kwargs) -> R:
-        for name in options:
-            if name not in allowed:
-                near = difflib.get_close_matches(name, allowed, 1)
-                hint = f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
-                raise TypeError(f"{shown_name}() has no option {name}{hint}")
-        return call(*given, **options)
+    renamed: deprecated names of options, with those that they have now.
+    """
 
-    return checked
+    def made(call: Callable[P, R]) -> Callable[P, R]:
+        allowed = [name for name in inspect.signature(call).parameters if name != "self"]
+        what = call.__qualname__.removesuffix(".__init__")
+
+        @functools.wraps(call)
+        def checked(*given: P.args, **named: P.kwargs) -> R:
+            for old in [name for name in named if name not in allowed]:
+                now = renamed.get(old)
+                if now is None or now in named:
+                    near = difflib.get_close_matches(old, allowed, 1)
+                    hint = f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
+                    raise TypeError(f"{what}() has no option {old}{hint}")
+                warnings.warn(
+                    f"{what}({old}=...) is deprecated: it is {now}", DeprecationWarning, stacklevel=2
+                )
+                named[now] = named.pop(old)
+            return call(*given, **named)
+
+        return checked
+
+    return made
 
 
 def check_callback(value: Any) -> None:

@@ -28,6 +28,7 @@ from .arguments import (
     array,
     finite,
     named,
+    options,
     shown,
     switch,
     texts,
@@ -107,7 +108,7 @@ class Engine:
     :class:`World`; with ``text``, what the text is called. worlds: how many copies. seed: of copy
     0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0
     for all. spawn
-    ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate":
+    ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), settings ({"p3at/LRF.update_rate":
     10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
     randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
     "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. plugin: shared libraries with
@@ -123,6 +124,7 @@ class Engine:
     the one before had drawn some: OSError.
     """
 
+    @options(set="settings")
     def __init__(
         self,
         world: str | os.PathLike[str] | World = "world",
@@ -134,7 +136,7 @@ class Engine:
         threads: int = 0,
         spawn: Iterable[str] = (),
         drive: Iterable[str] = (),
-        set: Mapping[str, object] | None = None,
+        settings: Mapping[str, object] | None = None,
         disable: Iterable[str] = (),
         fault: Iterable[str] = (),
         randomize: Mapping[str, str] | None = None,
@@ -159,7 +161,7 @@ class Engine:
             plugin = [os.fspath(one) if isinstance(one, os.PathLike) else one for one in plugin]
         worlds = whole("worlds", worlds, 1, MOST_WORLDS)
         seed = whole("seed", seed, 0, MOST_SEED - worlds + 1)
-        settings = named("set", set, '{"p3at/lrf.update_rate": 10}')
+        chosen = named("settings", settings, '{"p3at/lrf.update_rate": 10}')
         draws = named("randomize", randomize, '{"p3at.x": "uniform(-2, 2)"}')
         self._core = _made(
             os.fsencode(world),
@@ -170,7 +172,7 @@ class Engine:
             threads=whole("threads", threads, 0, 4096),
             spawn=texts("spawn", spawn),
             drive=texts("drive", drive),
-            set=texts("set", [f"{key}={value}" for key, value in settings.items()]),
+            set=texts("settings", [f"{key}={value}" for key, value in chosen.items()]),
             disable=texts("disable", disable),
             fault=texts("fault", fault),
             randomize=texts("randomize", [f"{one}={drawn}" for one, drawn in draws.items()]),
@@ -438,7 +440,7 @@ class Engine:
         """What was drawn for a copy, by target, from ``randomize`` and its seed.
 
         Targets are MODEL.x, .y, .z and .yaw (where it stands at the start), MODEL.mass (a factor),
-        MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``set``; "*" in MODEL
+        MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``settings``; "*" in MODEL
         or LIGHT stands for any text, and each that it names draws for itself. Distributions are
         uniform(LOW, HIGH), log_uniform(LOW, HIGH), normal(MEAN, STDDEV) and choice(VALUE, ...). A
         value depends on the seed and its target alone. Robots that are put somewhere are drawn
@@ -513,10 +515,10 @@ class Engine:
         return [self._checked(i) for i in np.atleast_1d(given)]
 
 
-def _made(world: bytes, **options: Any) -> Any:
+def _made(world: bytes, **given: Any) -> Any:
     """Raises BadWorld."""
     try:
-        return _engine.Engine(world, **options)
+        return _engine.Engine(world, **given)
     except ValueError as error:
         raise BadWorld(str(error)) from None
 

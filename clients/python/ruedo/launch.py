@@ -62,7 +62,7 @@ def _is_program(path: Path) -> bool:
     return path.is_file() and os.access(path, os.X_OK)
 
 
-@arguments.suggesting
+@arguments.options(set="settings")
 def launch(
     world: str | os.PathLike[str] | World | None = None,
     *,
@@ -77,7 +77,7 @@ def launch(
     lockstep: int | bool = 0,
     spawn: Sequence[str] = (),
     disable: Sequence[str] = (),
-    set: Mapping[str, object] | None = None,
+    settings: Mapping[str, object] | None = None,
     noise: bool = True,
     view: bool = False,
     duration: float | None = None,
@@ -95,7 +95,7 @@ def launch(
     ("arena"), or a World; text: the world's SDF or URDF itself instead. rate: sim time per real
     time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients the run
     waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable:
-    devices that are left out, "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal
+    devices that are left out, "p3at/camera". settings: {"p3at/lrf.rate": 20}. noise: False gives ideal
     values. duration: s of sim time after which the run ends. paused: it starts so, at step 0.
     record: the file of a log. snapshots: the folder for snapshot() and restore(). drive: drives by
     wheel joints, "rover=left_joint,right_joint". fault: what goes wrong, "p3at/lrf:freeze@3".
@@ -108,7 +108,7 @@ def launch(
     """
     timeout = arguments.number("timeout", timeout)
     name = arguments.client_name(name)
-    options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
+    options = _options(seed, rate, args, lockstep, spawn, disable, settings, noise)
     options += _more_options(duration, paused, record, snapshots)
     for option, several in (
         ("drive", drive),
@@ -239,15 +239,15 @@ def _options(
     lockstep: int | bool,
     spawn: Sequence[str],
     disable: Sequence[str],
-    set: Mapping[str, object] | None,
+    settings: Mapping[str, object] | None,
     noise: bool,
 ) -> list[str]:
     """Of `ruedo run`."""
     for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
         _check_list(name, several)
-    if set is not None and not isinstance(set, Mapping):
+    if settings is not None and not isinstance(settings, Mapping):
         raise TypeError(
-            f"set is {arguments.shown(set)}: it must be a dict, such as {{'p3at/lrf.rate': 20}}"
+            f"settings is {arguments.shown(settings)}: it must be a dict, such as {{'p3at/lrf.rate': 20}}"
         )
     options = []
     if seed is not None:
@@ -260,7 +260,7 @@ def _options(
         options += ["--spawn", model]
     for device in disable:
         options += ["--disable", device]
-    for key, value in (set or {}).items():
+    for key, value in (settings or {}).items():
         options += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
     if not arguments.switch("noise", noise):
         options.append("--no-noise")

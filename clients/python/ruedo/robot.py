@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 
 from . import lcmtypes
-from .arguments import check_callback, finite, number, numbers, shown, text
+from .arguments import check_callback, finite, number, numbers, options, shown, text
 from .errors import NoServer, NotSupported, UnknownName
 from .geometry import Floats, Transform
 from .joints import JointStream, limits_of
@@ -551,17 +551,18 @@ class Robot:
         command.deceleration = _limit("deceleration", deceleration)
         return command
 
-    def stream(self, name: str, type: Any = None, *, raw: bool = False) -> Stream[Any]:
+    @options(type="message")
+    def stream(self, name: str, message: Any = None, *, raw: bool = False) -> Stream[Any]:
         """The messages of a device or channel, by its name ("temp"); of a plugin's, too.
 
-        type: the class that lcm-gen made of its .lcm file; samples are its objects. raw: samples
+        message: the class that lcm-gen made of its .lcm file; samples are its objects. raw: samples
         are the bytes of the messages. Neither: Ruedo's own samples, where there are some of its
         type. What step() returns takes the stream, too.
         Raises UnknownName; at the first use TypeMismatch.
         """
-        if type is not None and raw:
-            raise TypeError("stream() takes a type or raw=True, not both")
-        form = RAW if raw else form_of(type) if type is not None else None
+        if message is not None and raw:
+            raise TypeError("stream() takes a message's class or raw=True, not both")
+        form = RAW if raw else form_of(message) if message is not None else None
         outputs = [channel for channel in self._channels if not channel.input]
         for channel in outputs:
             if name in (channel.device, channel.name) or channel.name == f"{self.name}/{name}":

@@ -107,7 +107,7 @@ def localise(seconds: float = 40.0, particles: int = 10_000, seed: int = 1) -> l
         lockstep=1,
         seed=seed,
         disable=["p3at/camera"],
-        set={"p3at/odometry.slip_noise": 0.005, "p3at/odometry.track_error": 0.02},
+        settings={"p3at/odometry.slip_noise": 0.005, "p3at/odometry.track_error": 0.02},
     ) as sim:
         robot = sim.robot("p3at")
         ahead = float(robot.lrf.position[0])

@@ -21,7 +21,7 @@ def square(side: float = 2.0, track_error: float = 0.0) -> tuple[ruedo.Odometry,
         ruedo.World().robot("p3at"),
         lockstep=1,
         disable=["p3at/camera"],
-        set={"p3at/odometry.track_error": track_error},
+        settings={"p3at/odometry.track_error": track_error},
     ) as sim:
         robot = sim.robot("p3at")
         for _ in range(4):

@@ -54,7 +54,7 @@ def ends(sign: float, track_error: float, radius_error: float, runs: int) -> np.
             lockstep=1,
             seed=run + 1,
             disable=["p3at/camera"],
-            set={
+            settings={
                 "p3at/odometry.track_error": track_error,
                 "p3at/odometry.radius_error": f"{radius_error} {-radius_error}",
                 "p3at/odometry.slip_noise": 0.0005,

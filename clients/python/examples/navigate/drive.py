@@ -54,7 +54,7 @@ def drive(policy: Policy, room: Room, seed: int, record: Path | None, url: str |
         seed=seed,
         lockstep=1,
         url=url,
-        set={"robot/lrf.lidar.scan.horizontal.samples": policy.beams},
+        settings={"robot/lrf.lidar.scan.horizontal.samples": policy.beams},
         disable=["robot/camera", "robot/sonar_front", "robot/sonar_rear"],
         args=["--record", str(record)] if record else [],
     ) as sim:

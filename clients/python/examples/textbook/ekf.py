@@ -54,7 +54,7 @@ def localise(seconds=40.0, seed=1):
         world.cylinder(float(x), float(y), radius=RADIUS)
     errors, mean, covariance = [], np.zeros(3), np.diag([1e-4, 1e-4, 1e-4])
     settings = {"p3at/odometry.track_error": 0.05, "p3at/odometry.slip_noise": 0.01}
-    with ruedo.launch(world, lockstep=1, seed=seed, disable=["p3at/camera"], set=settings) as sim:
+    with ruedo.launch(world, lockstep=1, seed=seed, disable=["p3at/camera"], settings=settings) as sim:
         robot = sim.robot("p3at")
         seen = sim.step(20)
         last = seen.latest(robot.odometry)

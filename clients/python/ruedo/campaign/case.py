@@ -179,7 +179,7 @@ class Runner:
         world = what["world"]
         options: dict[str, Any] = {
             "spawn": [world["spawn"]] if world["spawn"] else [],
-            "set": what["settings"],
+            "settings": what["settings"],
             "disable": what["disable"],
             "noise": what["noise"],
             "allow_errors": what["expect"].get("allow_errors", False),

@@ -33,7 +33,7 @@ def _check_world(what: dict[str, Any], source: Source) -> None:
     robot = what["expect"].get("robot", "")
     faults = [fault_text(one) for one in what["faults"]]
     parts: list[tuple[tuple[Any, ...], dict[str, Any]]] = [
-        *((("set", name), {"set": {name: value}}) for name, value in what["settings"].items()),
+        *((("set", name), {"settings": {name: value}}) for name, value in what["settings"].items()),
         *((("disable", i), {"disable": [one]}) for i, one in enumerate(what["disable"])),
         *((("faults", i), {"fault": [one]}) for i, one in enumerate(faults)),
         *([(("expect", "robot"), {"robot": robot})] if robot else []),
@@ -41,7 +41,7 @@ def _check_world(what: dict[str, Any], source: Source) -> None:
     if not parts:
         return
     try:
-        _load(what, robot, set=what["settings"], disable=what["disable"], fault=faults)
+        _load(what, robot, settings=what["settings"], disable=what["disable"], fault=faults)
     except ValueError as error:
         for path, options in parts:
             try:

@@ -82,7 +82,7 @@ def _engine(envs: int, beams: int) -> Callable[[], Any]:
     engine = Engine(
         world,
         worlds=envs,
-        set={"robot/lrf.lidar.scan.horizontal.samples": beams},
+        settings={"robot/lrf.lidar.scan.horizontal.samples": beams},
         disable=["robot/camera", "robot/sonar_front", "robot/sonar_rear"],
     )
     engine.observe("lrf.ranges")

@@ -44,7 +44,7 @@ class Console:
             text=text if file is None else None,
             seed=seed,
             lockstep=1,
-            set=options["set"],
+            settings=options["settings"],
             disable=options["disable"],
             noise=options["noise"],
             args=["--view", str(self._port), *([] if file else ["--allow-absolute"])],

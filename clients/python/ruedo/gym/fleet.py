@@ -93,7 +93,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
             "FleetEnv",
             text=self._text(0),
             noise=noise,
-            set={
+            settings={
                 f"{name}/lrf.lidar.scan.horizontal.samples": beams for name in self.possible_agents
             },
             disable=[

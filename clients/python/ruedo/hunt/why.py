@@ -137,7 +137,7 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
     made: dict[str, Any] = {
         "spawn": [],
         "drive": [],
-        "set": {},
+        "settings": {},
         "disable": [],
         "fault": [],
         "noise": True,
@@ -148,7 +148,7 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
             made["noise"] = False
         elif name == "set":
             key, _, setting = value.partition("=")
-            made["set"][key] = setting
+            made["settings"][key] = setting
         elif name in made:
             made[name].append(value)
         elif name != "remap":

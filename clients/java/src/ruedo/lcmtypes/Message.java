@@ -1,21 +1,15 @@
 package ruedo.lcmtypes;
 
+import lcm.lcm.LCMEncodable;
+
 import java.io.DataInput;
-import java.io.DataOutput;
 import java.io.IOException;
 
 /**
- * What all message types here can do. It takes the place of LCM's interface, so that this library
- * holds no class of LCM's and any LCM may lie beside it. To publish one with LCM's own classes,
- * encode it: {@code lcm.publish(channel, bytes, 0, bytes.length)}.
+ * What all message types here can do. They are LCM's, too: {@code lcm.publish(channel, message)} of
+ * LCM's own library takes them.
  */
-public interface Message {
-    /** Writes the fingerprint and the fields, as LCM has them on the wire. */
-    void encode(DataOutput out) throws IOException;
-
-    /** Writes the fields alone. */
-    void _encodeRecursive(DataOutput out) throws IOException;
-
+public interface Message extends LCMEncodable {
     /** Reads the fields alone. */
     void _decodeRecursive(DataInput in) throws IOException;
 }
