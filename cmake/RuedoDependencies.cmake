@@ -1,4 +1,4 @@
-# Finds Ruedo's dependencies; docs/getting-started.md lists the packages.
+# Finds Ruedo's dependencies; docs/install.md lists the packages.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED GLOBAL)    # of ruedo::client, which others link
 find_package(Eigen3 REQUIRED NO_MODULE)

@@ -72,7 +72,7 @@ missing_packages() {
 # Installs what is missing of the given packages: one call of apt, only when there is something to install.
 ensure_packages() {
   if ! command -v apt-get >/dev/null; then
-    say "no apt-get here: install what docs/getting-started.md lists, by your system's means"
+    say "no apt-get here: install what docs/install.md lists, by your system's means"
     return
   fi
   local missing

@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 BINARIES = Path(os.environ.get("RUEDO_BINARY_DIR", ROOT / "build/release")) / "bin"
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TIMEOUT_S = 400
 NETWORK = "ip link set lo up; ip route add 224.0.0.0/4 dev lo; "
 
@@ -72,7 +72,7 @@ def run_block(language, content, folder):
 
 
 CASES = [
-    pytest.param(language, content, id=f"{document.name}:{line}")
+    pytest.param(language, content, id=f"{document.relative_to(ROOT)}:{line}")
     for document in DOCUMENTS
     if document.exists()
     for line, language, content in blocks(document.read_text(encoding="utf-8"))
@@ -88,7 +88,7 @@ def test_examples_of_the_documentation(language, content, tmp_path):
     assert result.returncode == 0, f"{content}\n{result.stdout}"
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(ROOT)))
 def test_links_lead_somewhere(document):
     prose = re.sub(
         r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
@@ -100,7 +100,7 @@ def test_links_lead_somewhere(document):
 
 def test_packages_of_the_scripts_are_listed():
     script = (ROOT / "scripts/lib.sh").read_text(encoding="utf-8")
-    page = (ROOT / "docs/getting-started.md").read_text(encoding="utf-8").split()
+    page = (ROOT / "docs/install.md").read_text(encoding="utf-8").split()
     for group in re.findall(r"readonly (?:BUILD|TEST)_PACKAGES=\((.*?)\)", script, re.DOTALL):
         for specification in group.replace('"', "").replace("?", "").split():
             assert set(specification.split("|")) & set(page), specification
