@@ -1,0 +1,131 @@
+"""The site: it builds without a warning, loads nothing from elsewhere, its first page has five links
+for each reader, and its prose stays short.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("RUEDO_BINARY_DIR", ROOT / "build/release"))
+# Pages whose tables and texts scripts write from measurements or from proto/.
+APPENDIX = {"corpus.md", "experiments.md", "messages.md", "performance.md", "physics.md", "reality.md", "robots/README.md"}
+PAGES = [
+    *(ROOT / name for name in ("CONTRIBUTING.md", "SECURITY.md", "README.md")),
+    *(p for p in sorted((ROOT / "docs").rglob("*.md")) if str(p.relative_to(ROOT / "docs")) not in APPENDIX),
+]
+MOST_BYTES = 200_000
+READERS = ["Student", "ROS developer", "Engineer with CI", "Researcher who trains", "Maintainer"]
+
+
+def prose(text):
+    """Without code, comments and the rows of tables."""
+    text = re.sub(r"^ *```.*?^ *```$|<!--.*?-->", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines = [line for line in text.splitlines() if not line.lstrip().startswith("|")]
+    return "\n".join(line for line in lines if not line.startswith("    "))
+
+
+class Loaded(HTMLParser):
+    """What a browser fetches for a page without a click, and where its links lead."""
+
+    def __init__(self):
+        super().__init__()
+        self.loads, self.links = [], []
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        if tag in ("script", "img", "iframe", "source", "video") and given.get("src"):
+            self.loads.append(given["src"])
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preconnect", "preload"):
+            self.loads.append(given["href"])
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"])
+
+
+def parsed(page):
+    found = Loaded()
+    found.feed(page.read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    result = subprocess.run(
+        [sys.executable, ROOT / "scripts/site/build.py", BUILD, folder],
+        capture_output=True,
+        text=True,
+        timeout=900,
+        check=False,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder
+
+
+def test_pages_load_nothing_from_elsewhere(site):
+    pages = sorted(site.rglob("*.html"))
+    assert len(pages) > 50
+    for page in pages:
+        for address in parsed(page).loads:
+            assert not re.match(r"(https?:)?//", address), f"{page.name}: {address}"
+    for sheet in site.rglob("*.css"):
+        for address in re.findall(r"(?:url|@import)\s*\(?['\"]?((?:https?:)?//[^'\")]+)", sheet.read_text(encoding="utf-8")):
+            pytest.fail(f"{sheet.name}: {address}")
+
+
+def test_links_of_the_site_lead_somewhere(site):
+    for page in site.rglob("*.html"):
+        if page.is_relative_to(site / "api/cpp") or page.is_relative_to(site / "api/java") or page.name == "404.html":
+            continue
+        for link in parsed(page).links:
+            path = link.partition("#")[0].partition("?")[0]
+            if path and "://" not in path and not path.startswith(("mailto:", "javascript:")):
+                assert (page.parent / path).exists(), f"{page.relative_to(site)}: {link}"
+
+
+def test_what_a_page_needs_is_small(site):
+    files = [path for path in site.rglob("*") if path.is_file()]
+    assert not [path for path in files if path.suffix == ".map"]
+    # Most of it pictures; what is left is compressed to a quarter in the wheel.
+    assert sum(path.stat().st_size for path in files) < 12e6
+
+
+def test_there_is_a_page_of_each_command_sample_and_class(site):
+    for page, words in {
+        "commands.html": ["regress", "nav2-params", "--lockstep"],
+        "messages.html": ["Odometry", "GET_STATE"],
+        "api/python.html": ["ruedo.robot.Robot.advance", "ruedo.engine.Engine.observe", "ruedo.world.World.wall"],
+        "world-files.html": ["ruedo:watchdog"],
+    }.items():
+        text = (site / page).read_text(encoding="utf-8")
+        for word in words:
+            assert word in text, (page, word)
+
+
+def test_search_has_all_pages(site):
+    index = (site / "search/search_index.json").read_text(encoding="utf-8")
+    assert all(word in index for word in ("advance", "Coming from Webots", "dead reckoning"))
+
+
+def test_each_reader_has_five_links():
+    text = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    sections = dict(re.findall(r"^## (.+)\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))
+    assert list(sections) == READERS
+    for reader, section in sections.items():
+        assert len(re.findall(r"^\d\. \[", section, re.MULTILINE)) == 5, reader
+
+
+def test_prose_is_short():
+    sizes = {str(p.relative_to(ROOT)): len(prose(p.read_text(encoding="utf-8")).encode()) for p in PAGES}
+    longest = sorted(sizes.items(), key=lambda item: -item[1])[:8]
+    print(f"prose: {sum(sizes.values())} bytes of {len(sizes)} pages; longest: {longest}")
+    assert sum(sizes.values()) <= MOST_BYTES, longest
+
+
+def test_prose_is_what_is_left_of_a_page():
+    assert prose("a\n```sh\nb\n```\n| c |\n    d\n<!-- e -->\nf") == "a\n\n\nf"
