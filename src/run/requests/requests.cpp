@@ -293,7 +293,7 @@ const char* kind_of(world::JointType type) {
   return "";
 }
 
-void add(const world::Joint& joint, joint_limits_t& reply) {
+void add_limits(const world::Joint& joint, joint_limits_t& reply) {
   const world::JointAxis& axis = joint.axis;
   const bool limited = axis.lower <= axis.upper;
   constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -317,7 +317,7 @@ Outcome Run::get_joint_limits(const request_t&, const name_request_t& body) {
     if (instance.removed || instance.name != body.name) continue;
     joint_limits_t reply{};
     for (const JointIndex joint : robot.joints)
-      add(instance.model->joints[layout.joints[joint].joint], reply);
+      add_limits(instance.model->joints[layout.joints[joint].joint], reply);
     return Outcome::with(engine::encoded(reply));
   }
   return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
