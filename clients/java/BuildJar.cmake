@@ -1,7 +1,7 @@
 # Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LICENSE, LCM_GEN, PYTHON, JAVAC and JAR say from what and with what.
 #
 # The message types come out as the package ruedo.lcmtypes: renamed on the way, so that they do not meet the
-# library's own classes; LCM's fingerprints do not depend on it. They need no class of LCM's, which may lie beside them.
+# library's own classes; LCM's fingerprints do not depend on it. They implement LCM's interface, which is declared here, too, and LCM's own jar may lie beside them.
 include(${CMAKE_CURRENT_LIST_DIR}/jar.cmake)
 
 set(work ${OUTPUT}/work)

@@ -80,4 +80,4 @@ def test_monte_carlo_localisation_finds_the_robot():
     import localisation
 
     errors = localisation.localise()
-    assert errors[0] > 1.0 and max(errors[-10:]) < 0.3
+    assert errors[0] > 0.3 and max(errors[-10:]) < 0.1

@@ -137,14 +137,14 @@ def test_it_drives_on_class_path_and_module_path(version, repository, project):
 
 
 def test_another_lcm_may_lie_beside_it(repository, project):
-    """On the module path a package is in one module alone: LCM's jar has lcm.lcm, ours no package
-    of its.
-    """
+    """On the class path: both declare LCM's interface LCMEncodable, whichever comes first."""
     import lcm
 
     jar = repository / f"ruedo/ruedo/{VERSION}/ruedo-{VERSION}.jar"
     other = Path(lcm.__file__).resolve().parents[1] / "share/java/lcm.jar"
-    said = run(
-        java("25"), "-p", f"{project}:{jar}:{other}", "--add-modules", "lcm", "--list-modules"
-    )
-    assert "ruedo" in said and "lcm" in said
+    isolated = [sys.executable, SOURCE / "tests/clients/isolated.py", java("25")]
+    environment = {k: v for k, v in os.environ.items() if k != "LCM_DEFAULT_URL"}
+    environment["RUEDO"] = str(BUILD / "bin/ruedo")
+    for both in (f"{jar}:{other}", f"{other}:{jar}"):
+        said = run(*isolated, "-cp", f"{project}:{both}", "trial.Drive", env=environment)
+        assert said.splitlines()[-1] == "25 0.500 class path"

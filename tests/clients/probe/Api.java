@@ -96,7 +96,7 @@ public final class Api {
                 sim.step(
                         400,
                         List.of(robot.jointCommand(Map.of("elbow", 0.1), JointMode.POSITION)));
-        say("reached", seen.latest(robot.joints()).get().position("elbow"));
+        say("reached", seen.latest(robot.joints()).position("elbow"));
     }
 
     /** The robot turns about a circle: at each moment its place follows from its heading. */

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import ruedo
 
-PERIOD, HORIZON, RADIUS = 0.1, 2.0, 0.45  # s, s, m: of control, of a look ahead, of the robot
+PERIOD, HORIZON, RADIUS = 0.1, 3.0, 0.45  # s, s, m: of control, of a look ahead, of the robot
 
 
 def arcs(v, omega, times):
@@ -21,7 +21,7 @@ def arcs(v, omega, times):
 
 def choose(robot, points, goal, now):
     """(v, omega) for the next moment. points: (k, 2) m and goal: (2,) m, in the robot's frame."""
-    v = np.clip(now[0] + np.linspace(-0.05, 0.05, 5), 0.0, 0.5)
+    v = np.clip(now[0] + np.linspace(-0.03, 0.03, 5), 0.0, 0.5)
     omega = np.clip(now[1] + np.linspace(-0.3, 0.3, 15), -1.0, 1.0)
     v, omega = (one.ravel() for one in np.meshgrid(v, omega))
     times = np.arange(PERIOD, HORIZON, PERIOD)
@@ -36,8 +36,8 @@ def choose(robot, points, goal, now):
         return 0.0, math.copysign(0.6, goal[1])
     ends, headings = ways[:, -1], omega * times[-1]
     away = np.arctan2(goal[1] - ends[:, 1], goal[0] - ends[:, 0]) - headings
-    score = 0.8 * (1.0 - abs(ruedo.normalize_angle(away)) / math.pi)
-    score += 0.4 * np.minimum(clear.min(axis=1), 1.0) + 0.5 * v
+    score = 0.3 * (1.0 - abs(ruedo.normalize_angle(away)) / math.pi)
+    score += 0.4 * np.minimum(clear.min(axis=1), 1.0) + 2.0 * v
     best = np.where(admissible, score, -np.inf).argmax()
     return float(v[best]), float(omega[best])
 

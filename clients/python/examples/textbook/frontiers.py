@@ -10,7 +10,9 @@ CELL, HALF, RADIUS = 0.1, 5.0, 0.4  # m: of a cell, half the map's side, of the 
 
 
 def mark(cells, chart, scan, robot, pose):
-    """Draws a scan into the cells: rays are free, their ends occupied."""
+    """Draws a scan into the cells: rays and where the robot is are free, the rays' ends taken."""
+    middles = chart.place(*np.indices(cells.shape))
+    cells[np.hypot(*(middles - (pose.x, pose.y)).transpose(2, 0, 1)) < RADIUS] = 0
     sensor = pose.transform @ robot.lrf.transform
     ranges = np.where(np.isfinite(scan.ranges), scan.ranges, 8.0)
     for share in np.arange(0.0, 1.0, 0.01):
@@ -20,9 +22,8 @@ def mark(cells, chart, scan, robot, pose):
         inside = (row >= 0) & (row < len(cells)) & (column >= 0) & (column < len(cells))
         cells[row[inside], column[inside]] = 0
     for x, y, _ in scan.points(robot.lrf, pose):
-        row, column = chart.cell(x, y)
-        if 0 <= row < len(cells) and 0 <= column < len(cells):
-            cells[row, column] = 100
+        if max(abs(x), abs(y)) < HALF:
+            cells[chart.cell(x, y)] = 100
 
 
 def way_to_frontier(cells, safe, start):
@@ -53,15 +54,19 @@ def explore(seconds=150.0):
     chart = ruedo.Map(cells, CELL, (-HALF, -HALF, 0.0))
     with ruedo.launch(world, lockstep=1, noise=False, disable=["p3at/camera"]) as sim:
         robot = sim.robot("p3at")
-        seen = sim.step(20)
+        seen, turn = sim.step(20), 0
         while seen.time < seconds:
             pose, scan = seen.latest(robot.pose), seen.latest(robot.lrf)
-            mark(cells, chart, scan, robot, pose)
-            safe = (cells == 0) & (chart.distance_field() > RADIUS)
-            way = way_to_frontier(cells, safe, chart.cell(pose.x, pose.y))
-            if not way:
-                return chart, True
-            ahead = pose.transform.inverse().apply(chart.place(*way[min(6, len(way) - 1)]))
+            if turn % 10 == 0:  # once a second
+                mark(cells, chart, scan, robot, pose)
+                safe = (cells == 0) & (chart.distance_field() > RADIUS)
+                way = way_to_frontier(cells, safe, chart.cell(pose.x, pose.y))
+                if not way:
+                    return chart, True
+            turn += 1
+            while len(way) > 2 and np.hypot(*(chart.place(*way[0]) - (pose.x, pose.y))) < 0.5:
+                way.pop(0)
+            ahead = pose.transform.inverse().apply(chart.place(*way[0]))
             bearing = np.arctan2(ahead[1], ahead[0])
             speed = 0.3 * max(0.0, np.cos(bearing)) if abs(bearing) < 0.8 else 0.0
             command = robot.velocity_command(speed, float(np.clip(1.5 * bearing, -1.0, 1.0)))

@@ -18,8 +18,7 @@ def servo(beacon=(4.0, 1.2), seconds=30.0):
     """Distance of the camera from the beacon (m) and its bearing (rad) at the end."""
     x, y = beacon
     world = ruedo.World().robot("p3at").cylinder(x, y, radius=RADIUS, height=1.2, colour=(0.9, 0.05, 0.05))
-    settings = {"p3at/camera.jpeg_quality": 95}
-    with ruedo.launch(world, lockstep=1, noise=False, settings=settings) as sim:
+    with ruedo.launch(world, lockstep=1, noise=False) as sim:
         robot = sim.robot("p3at")
         seen, command = sim.step(20), (0.0, 0.4)
         focal = robot.camera.width / 2.0 / np.tan(robot.camera.fov_horizontal / 2.0)

@@ -1,5 +1,6 @@
 package lcm.lcm;
 
+import java.io.DataInput;
 import java.io.DataOutput;
 import java.io.IOException;
 
@@ -14,4 +15,7 @@ public interface LCMEncodable {
 
     /** Writes the fields alone. */
     void _encodeRecursive(DataOutput outs) throws IOException;
+
+    /** Reads the fields alone. */
+    void _decodeRecursive(DataInput ins) throws IOException;
 }

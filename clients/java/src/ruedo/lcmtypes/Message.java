@@ -2,14 +2,8 @@ package ruedo.lcmtypes;
 
 import lcm.lcm.LCMEncodable;
 
-import java.io.DataInput;
-import java.io.IOException;
-
 /**
- * What all message types here can do. They are LCM's, too: {@code lcm.publish(channel, message)} of
- * LCM's own library takes them.
+ * What all message types here can do: they are LCM's, too, so that {@code lcm.publish(channel,
+ * message)} of LCM's own library takes them.
  */
-public interface Message extends LCMEncodable {
-    /** Reads the fields alone. */
-    void _decodeRecursive(DataInput in) throws IOException;
-}
+public interface Message extends LCMEncodable {}
