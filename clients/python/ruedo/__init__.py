@@ -67,6 +67,16 @@ else:
     samples = vocabulary = SimpleNamespace(__all__=[])
 
 
+if TYPE_CHECKING:
+    from .engine import Engine as Engine
+    from .engine import SavedWorld as SavedWorld
+
+
+def __dir__() -> list[str]:
+    """What users should see."""
+    return sorted([*__all__, "__version__"])
+
+
 def __getattr__(name: str) -> object:
     """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
     it is first asked for.
@@ -130,3 +140,5 @@ __all__ = [
     "read_log",
 ]
 __all__ += samples.__all__ + vocabulary.__all__
+if find_spec("ruedo._engine"):
+    __all__ += ["Engine", "SavedWorld"]

@@ -24,7 +24,10 @@ int64_t random_id() {
 }  // namespace
 
 PlayedRun::PlayedRun(const std::string& path, bus::LcmBus& bus) : bus_(bus), run_id_(random_id()) {
-  if (!std::filesystem::is_regular_file(path)) return bus_.keep_connected();
+  if (!std::filesystem::is_regular_file(path)) {
+    bus_.keep_connected();
+    return;
+  }
   const log::Index index(path);
   worlds_ = std::make_unique<run::LogWorlds>(
       index, [&](const log_header_t& header) { return load_run(header, path); });
