@@ -78,7 +78,7 @@ describe("rays and cones", () => {
   it("of many robots are fainter, so that what lies below stays to be seen", () => {
     const overlay = new RobotOverlay([], [0, 0, 0, 1, 0, 0, 0], "key"),
       device = { name: "lrf", kind: "lrf", position: [0, 0, 0], orientation: [1, 0, 0, 0] },
-      scan = { ranges: [1, 2], rad0: 0, radstep: 0.1 };
+      scan = { ranges: [1, 2], intensities: [], rad0: 0, radstep: 0.1 };
     overlay.scan(device as unknown as device_info_t, scan as unknown as planar_lidar_t);
     const opacities = () => {
       const found: number[] = [];
