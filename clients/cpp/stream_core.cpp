@@ -224,11 +224,10 @@ std::optional<StreamCore::Neighbours> StreamCore::around(int64_t utime, Duration
   std::shared_ptr<Arrival> before, after;
   {
     std::unique_lock lock(mutex_);
-    await(*core, lock, timeout,
-          [&] { return !kept_.empty() && *kept_.back()->utime() >= utime; });
-    const auto found =
-        std::find_if(kept_.begin(), kept_.end(),
-                     [&](const auto& arrival) { return *arrival->utime() >= utime; });
+    await(*core, lock, timeout, [&] { return !kept_.empty() && *kept_.back()->utime() >= utime; });
+    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& arrival) {
+      return *arrival->utime() >= utime;
+    });
     after = *found;
     if (*after->utime() != utime && found == kept_.begin()) return std::nullopt;
     before = *after->utime() == utime ? after : *std::prev(found);

@@ -555,7 +555,7 @@ class Joint {
   void set_position(double value) const;  ///< @param value rad or m, kept within the limits
   void set_velocity(double value) const;  ///< @param value rad/s or m/s
   void set_effort(double value) const;    ///< @param value N m or N
-  /// @}
+                                          /// @}
 
  private:
   std::shared_ptr<Core> core_;
@@ -627,16 +627,16 @@ class Robot {
   Device<Odometry> odometry() const;   ///< @return the odometry
   /// @return what the odometry makes of the wheels' speeds, also sideways
   Stream<OdometryTwist> odometry_twist() const;
-  Device<NavSat> gps() const;  ///< @return the satellite receiver; see NavSat::enu()
-  Device<Magnetometer> magnetometer() const;    ///< @return the magnetometer
-  Device<Altimeter> altimeter() const;          ///< @return the altimeter
-  Device<AirPressure> air_pressure() const;     ///< @return the barometer
-  Device<AirSpeed> air_speed() const;           ///< @return the Pitot tube
-  Device<ForceTorque> force_torque() const;     ///< @return the force-torque sensor
-  Device<LogicalCamera> logical_camera() const; ///< @return the logical camera
-  Camera camera() const;            ///< @return the camera
-  Device<Imu> imu() const;          ///< @return the inertial unit
-  Device<Contact> contact() const;  ///< @return the bumper
+  Device<NavSat> gps() const;                 ///< @return the satellite receiver; see NavSat::enu()
+  Device<Magnetometer> magnetometer() const;  ///< @return the magnetometer
+  Device<Altimeter> altimeter() const;        ///< @return the altimeter
+  Device<AirPressure> air_pressure() const;   ///< @return the barometer
+  Device<AirSpeed> air_speed() const;         ///< @return the Pitot tube
+  Device<ForceTorque> force_torque() const;   ///< @return the force-torque sensor
+  Device<LogicalCamera> logical_camera() const;  ///< @return the logical camera
+  Camera camera() const;                         ///< @return the camera
+  Device<Imu> imu() const;                       ///< @return the inertial unit
+  Device<Contact> contact() const;               ///< @return the bumper
   /// @}
   /// @return what it runs into, and what blocks it; it needs no bumper
   /// @throws UnknownName, NoServer

@@ -36,7 +36,7 @@ using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 /// The pose of a frame B in a frame A: takes points of B to A. Products compose: if a is B in A and
 /// b is C in B, a * b is C in A.
 struct Transform {
-  Vector3 position{};                     ///< m
+  Vector3 position{};                          ///< m
   Quaternion orientation{1.0, 0.0, 0.0, 0.0};  ///< a unit quaternion w, x, y, z
 
   /// @param x m

@@ -257,7 +257,8 @@ void write_classes(JsonWriter& out, const world::WorldModel& world,
                    const world::BodyLayout& layout) {
   std::map<int, std::vector<InstanceIndex>> classes;
   for (const world::LinkPlacement& link : layout.links) {
-    for (const world::Visual& visual : world.models[link.instance].model->links[link.link].visuals) {
+    for (const world::Visual& visual :
+         world.models[link.instance].model->links[link.link].visuals) {
       std::vector<InstanceIndex>& known = classes[visual.label];
       if (visual.label > 0 && std::find(known.begin(), known.end(), link.instance) == known.end())
         known.push_back(link.instance);

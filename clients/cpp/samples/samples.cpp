@@ -68,8 +68,7 @@ std::vector<Vector3> Scan::points(const Transform& device) const {
   for (size_t i = 0; i < ranges.size(); ++i) {
     const double range = static_cast<double>(ranges[i]);
     if (std::isfinite(range))
-      points.push_back(
-          device.apply({range * std::cos(angle(i)), range * std::sin(angle(i)), 0.0}));
+      points.push_back(device.apply({range * std::cos(angle(i)), range * std::sin(angle(i)), 0.0}));
   }
   return points;
 }
@@ -103,7 +102,7 @@ Odometry Odometry::interpolated(const Odometry& later, int64_t at) const {
   const double share = share_of(*this, later, at);
   Odometry made = *this;
   made.utime = at;
-  for (double Odometry::*field :
+  for (double Odometry::* field :
        {&Odometry::x, &Odometry::y, &Odometry::theta, &Odometry::v, &Odometry::omega})
     made.*field = mixed(this->*field, later.*field, share);
   made.wheel_angles = mixed(wheel_angles, later.wheel_angles, share);
@@ -116,7 +115,7 @@ Pose Pose::interpolated(const Pose& later, int64_t at) const {
   Pose made = *this;
   made.utime = at;
   made.orientation = turned(orientation, later.orientation, share);
-  for (Vector3 Pose::*field :
+  for (Vector3 Pose::* field :
        {&Pose::position, &Pose::velocity, &Pose::rotation_rate, &Pose::acceleration})
     made.*field = mixed(this->*field, later.*field, share);
   return made;

@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from .arguments import shown
 from .errors import UnknownName
 from .geometry import Floats, Transform
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from .samples import State
+
+
+class _Simulation(Protocol):
+    def state(self, name: str) -> State: ...
+    def set_pose(
+        self,
+        name: str,
+        x: float,
+        y: float,
+        heading: float = ...,
+        z: float = ...,
+        orientation: Sequence[float] | None = ...,
+    ) -> None: ...
+    def set_twist(
+        self, name: str, linear: Sequence[float], angular: Sequence[float] = ...
+    ) -> None: ...
+    def remove(self, name: str) -> None: ...
 
 
 class Twist(NamedTuple):
@@ -31,18 +48,18 @@ class Body:
     name: str  # MODEL/LINK, or MODEL
     is_static: bool  # it never moves
     mass: float  # kg; 0 of what never moves
-    _simulation: Simulation | None = field(default=None, repr=False, compare=False)
+    _simulation: _Simulation | None = field(default=None, repr=False, compare=False)
 
     @property
     def pose(self) -> Transform:
         """In the world."""
-        state = self._of.state(self.name)
+        state = self._there.state(self.name)
         return Transform(state.position, state.orientation)
 
     @property
     def twist(self) -> Twist:
         """In the world."""
-        state = self._of.state(self.name)
+        state = self._there.state(self.name)
         return Twist(state.linear, state.angular)
 
     def set_pose(
@@ -53,29 +70,29 @@ class Body:
         """
         if isinstance(x, Transform):
             at = x.position
-            self._of.set_pose(
+            self._there.set_pose(
                 self.name, at[0], at[1], z=at[2], orientation=x.orientation.tolist()
             )
         else:
-            self._of.set_pose(self.name, x, y, heading, z)
+            self._there.set_pose(self.name, x, y, heading, z)
 
     def set_twist(
         self, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)
     ) -> None:
         """Gives the model a velocity (m/s) and a turn rate (rad/s), in the world."""
-        self._of.set_twist(self.name, linear, angular)
+        self._there.set_twist(self.name, linear, angular)
 
     def remove(self) -> None:
         """Takes the model away."""
-        self._of.remove(self.name)
+        self._there.remove(self.name)
 
     @property
-    def _of(self) -> Simulation:
+    def _there(self) -> _Simulation:
         assert self._simulation is not None
         return self._simulation
 
 
-def found(bodies: Iterable[Body], name: str, simulation: Simulation) -> Body:
+def found(bodies: Iterable[Body], name: str, simulation: _Simulation) -> Body:
     """A body, or a model's bodies as one. Raises UnknownName, which lists the models."""
     there = list(bodies)
     parts = [one for one in there if one.name == name or one.name.startswith(f"{name}/")]

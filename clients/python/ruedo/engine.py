@@ -87,15 +87,15 @@ class SavedWorld(Saved):
 class TimeOfCopies(float):
     """s, of copy 0; called with an index, of that copy."""
 
-    _of: Callable[[int], float]
+    _of_copy: Callable[[int], float]
 
     def __new__(cls, time: float, of: Callable[[int], float]) -> Self:
         made = super().__new__(cls, time)
-        made._of = of
+        made._of_copy = of
         return made
 
     def __call__(self, world: int = 0) -> float:
-        return self._of(world)
+        return self._of_copy(world)
 
     def __reduce__(self) -> Any:
         return float, (float(self),)

@@ -1,28 +1,14 @@
-"""Programs in step with sim time: streams joined by their stamps, and loops at a fixed period."""
+"""Loops at a fixed period of sim time."""
 
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .errors import NotSupported, RunEnded
-from .stream import Stream
 
 if TYPE_CHECKING:
     from .session.connection import Connection
-
-
-def synchronised(first: Stream[Any], others: tuple[Stream[Any], ...]) -> Iterator[tuple[Any, ...]]:
-    """Samples of the first stream, each with those of the others at its stamp."""
-    for other in others:
-        other._subscribe()
-    for sample in first.reader():
-        try:
-            joined = [other._at(sample.utime, 5.0) for other in others]
-        except RunEnded:
-            return
-        if all(one is not None for one in joined):  # else it came before the others' first
-            yield (sample, *joined)
 
 
 class Every:

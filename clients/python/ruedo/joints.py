@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from . import lcmtypes
-from .session.control import reply_of
 from .arguments import finite, shown, text
 from .errors import NotSupported, UnknownName
 from .samples import JointLimits, Joints
+from .session.control import reply_of
+from .session.link import Link
 from .stream import Stream
 from .vocabulary import JOINT_MODES, JointMode
 
 if TYPE_CHECKING:
-    from .session.connection import Connection
-    from .lockstep import Command
-    from .robot import Robot
+    from .session.control import Session
 
 # Modes for what is no joint, but a detachable joint's, a lift's or a door's name: the server knows.
 _OF_OTHERS = (JointMode.ATTACHED, JointMode.FLOOR, JointMode.OPEN)
+
+
+class _Link(Link, Protocol):
+    @property
+    def session(self) -> Session: ...
+
+
+class _Robot(Protocol):
+    name: str
+
+    @property
+    def joints(self) -> JointStream: ...
+    def command_joints(self, values: Mapping[str, float], *, mode: str) -> None: ...
 
 
 class Joint:
@@ -31,7 +43,7 @@ class Joint:
     it: it holds its position until its first command. The others are free until then.
     """
 
-    def __init__(self, robot: Robot, limits: JointLimits, index: int):
+    def __init__(self, robot: _Robot, limits: JointLimits, index: int):
         self._robot = robot
         self.name: str = limits.names[index]
         self.kind: str = limits.kinds[index]
@@ -82,26 +94,33 @@ class Joint:
 class JointStream(Stream[Joints]):
     """The states of a robot's joints, and the joints themselves by their names."""
 
-    _owner: Robot
+    _of_robot: _Robot
+
+    _link: _Link
+
+    def attach(self, robot: _Robot, link: _Link) -> JointStream:
+        """Says whose joints they are."""
+        self._of_robot, self._link = robot, link
+        return self
 
     def __getitem__(self, name: str) -> Joint:
         """Raises UnknownName, which lists the joints."""
-        limits = limits_of(self._connection, self._owner.name)
-        return Joint(self._owner, limits, limits.names.index(checked(self._owner.name, limits, name)))
+        limits = limits_of(self._link, self._of_robot.name)
+        return Joint(self._of_robot, limits, limits.names.index(checked(self._of_robot.name, limits, name)))
 
     @property
     def names(self) -> list[str]:
         """Of all joints, in the order of the samples."""
-        return list(limits_of(self._connection, self._owner.name).names)
+        return list(limits_of(self._link, self._of_robot.name).names)
 
 
-def limits_of(connection: Connection, robot: str) -> JointLimits:
+def limits_of(link: _Link, robot: str) -> JointLimits:
     """Asked for once, and again where the world has changed."""
-    known = connection.info.joint_limits
+    known = link.info.joint_limits
     if robot not in known:
         body = lcmtypes.name_request_t()
         body.name = robot
-        reply = connection.session.request(lcmtypes.request_t.GET_JOINT_LIMITS, body)
+        reply = link.session.request(lcmtypes.request_t.GET_JOINT_LIMITS, body)
         known[robot] = reply_of(reply, "joint_limits_t")
     return known[robot]
 

@@ -95,14 +95,14 @@ def launch(
     ("arena"), or a World; text: the world's SDF or URDF itself instead. rate: sim time per real
     time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients the run
     waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable:
-    devices that are left out, "p3at/camera". settings: {"p3at/lrf.rate": 20}. noise: False gives ideal
-    values. duration: s of sim time after which the run ends. paused: it starts so, at step 0.
+    devices that are left out, "p3at/camera". settings: {"p3at/lrf.rate": 20}. noise: False gives
+    ideal values. duration: s of sim time after which the run ends. paused: it starts so, at step 0.
     record: the file of a log. snapshots: the folder for snapshot() and restore(). drive: drives by
     wheel joints, "rover=left_joint,right_joint". fault: what goes wrong, "p3at/lrf:freeze@3".
     plugin: shared libraries with sensors or drives. wait_for: inputs that the run waits for where a
-    command is due, "p3at/velocity@10". args: further options of `ruedo run`. url: None takes a local socket, which no other
-    user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name:
-    of this client. timeout: s of real time until the world is loaded. verbose: show what the server
+    command is due, "p3at/velocity@10". args: further options of `ruedo run`. url: None takes a
+    local socket, which no other user of the machine reads, and plain LCM programs do not know;
+    "auto" a free port for LCM. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server
     prints (else it is shown in the errors alone). view: the web console, which show() of the
     simulation opens. Raises LaunchError with what the server said.
     """
@@ -110,15 +110,7 @@ def launch(
     name = arguments.client_name(name)
     options = _options(seed, rate, args, lockstep, spawn, disable, settings, noise)
     options += _more_options(duration, paused, record, snapshots)
-    for option, several in (
-        ("drive", drive),
-        ("fault", fault),
-        ("plugin", plugin),
-        ("wait_for", wait_for),
-    ):
-        _check_list(option, several)
-        for one in several:
-            options += [f"--{option.replace('_', '-')}", os.fspath(one)]
+    options += _repeated(drive=drive, fault=fault, plugin=plugin, wait_for=wait_for)
     options += ["--allow-absolute"] * isinstance(world, World)  # this program chose its files
     port = _free_port() if view else 0
     options += ["--view", str(port)] if port else []
@@ -141,6 +133,16 @@ def launch(
     except BaseException:
         server.end()
         raise
+
+
+def _repeated(**lists: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """An option for each element of these lists."""
+    options: list[str] = []
+    for option, several in lists.items():
+        _check_list(option, several)
+        for one in several:
+            options += [f"--{option.replace('_', '-')}", os.fspath(one)]
+    return options
 
 
 def _world_file(

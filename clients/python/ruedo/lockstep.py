@@ -287,7 +287,7 @@ class Stepper:
             ):  # a model came
                 if max(self._early, default=0) >= len(self._connection.info.channel_list):
                     self._connection.refresh_info()
-                self._subscribe()
+                self._subscribe_all()
             return self._collect()
 
     def whose_turn(self) -> str:
@@ -318,7 +318,7 @@ class Stepper:
     def _take_part(self, timeout: float) -> None:
         arrivals.compiled()
         self._connection.bus.on_arrived = self.note_arrived
-        self._subscribe()
+        self._subscribe_all()
         body = lcmtypes.grant_request_t()
         body.granted = body.received = -1
         reply = self._connection.session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
@@ -350,7 +350,7 @@ class Stepper:
         )
         self._last = (state.utime, state.step, state.state_hash)
 
-    def _subscribe(self) -> None:
+    def _subscribe_all(self) -> None:
         """To everything that the simulation publishes: a manifest may name any of it."""
         info = self._connection.info
         if self._info is info:

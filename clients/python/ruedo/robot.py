@@ -303,8 +303,7 @@ class Robot:
         """The states of its joints, and each of them by its name: ``robot.joints["elbow"]``."""
         stream = self._stream("joint_state_t", "joints")
         assert isinstance(stream, JointStream)
-        stream._owner = self
-        return stream
+        return stream.attach(self, self._connection)
 
     # Driving.
 

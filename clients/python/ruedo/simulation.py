@@ -18,7 +18,7 @@ from . import arguments, lcmtypes
 from .bodies import Body, found
 from .callbacks import Subscription
 from .errors import NotSupported, RunEnded
-from .in_step import Every, synchronised
+from .in_step import Every
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
 from .requests import Requests
@@ -26,7 +26,7 @@ from .robot import Robot
 from .samples import State
 from .session import control
 from .session.connection import Connection, PrivateServer
-from .stream import Stream
+from .stream import Stream, synchronised
 from .transport.address import resolve_url
 from .transport.transport import Transport
 from .world_info import WorldInfo

@@ -109,7 +109,7 @@ class Reader(Generic[T]):
             while True:
                 woken.clear()
                 try:
-                    arrival = self._stream._poll(self)
+                    arrival = self._stream._poll_for(self)
                 except RunEnded:
                     return
                 if arrival:
@@ -249,7 +249,7 @@ class Stream(Reader[T]):
             return between
         return before if utime - times[after - 1] < times[after] - utime else behind
 
-    def _poll(self, reader: Reader[T]) -> _Arrival | None:
+    def _poll_for(self, reader: Reader[T]) -> _Arrival | None:
         """What next() would return, or None: then the caller's thread waits for it. Raises what
         next() does."""
         connection = self._connection
@@ -503,3 +503,16 @@ class Streams:
             streams = list(self._all.values())
         for stream in streams:
             stream._forget()
+
+
+def synchronised(first: Stream[Any], others: tuple[Stream[Any], ...]) -> Iterator[tuple[Any, ...]]:
+    """Samples of the first stream, each with those of the others at its stamp."""
+    for other in others:
+        other._subscribe()
+    for sample in first.reader():
+        try:
+            joined = [other._at(sample.utime, 5.0) for other in others]
+        except RunEnded:
+            return
+        if all(one is not None for one in joined):  # else it came before the others' first
+            yield (sample, *joined)

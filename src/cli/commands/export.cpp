@@ -7,9 +7,9 @@
 
 #include "bridges/foxglove/foxglove.h"
 #include "bridges/ros2/bag/rosbag.h"
+#include "cli/logs/logged_run.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
-#include "cli/support/logged_run.h"
 #include "cli/support/sandboxed.h"
 #include "cli/support/signal_thread.h"
 #include "log/reader.h"

@@ -14,9 +14,9 @@
 #include "bridges/ros2/bag/bag_log.h"
 #include "bus/lcm_bus.h"
 #include "bus/url_claim.h"
+#include "cli/logs/played_run.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
-#include "cli/support/played_run.h"
 #include "cli/support/range.h"
 #include "cli/support/sandboxed.h"
 #include "cli/support/signal_thread.h"
@@ -120,8 +120,8 @@ int play(const PlayArguments& arguments) {
     if (in_logs_only(event.channel)) continue;
     if (messages == 0) first_us = event.timestamp_us, begin = Clock::now();
     run.serve(event.timestamp_us);
-    if (std::isfinite(speed) && !sleep_until(due(begin, event.timestamp_us - first_us, speed), run,
-                                             event.timestamp_us))
+    if (std::isfinite(speed) &&
+        !sleep_until(due(begin, event.timestamp_us - first_us, speed), run, event.timestamp_us))
       break;
     bus.publish(event.channel, event.data.data(), event.data.size());
     ++messages;

@@ -7,9 +7,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/progress.h"
+#include "cli/logs/logged_run.h"
 #include "cli/support/commands.h"
 #include "cli/support/find_all.h"
-#include "cli/support/logged_run.h"
 #include "cli/support/range.h"
 #include "report/render_devices.h"
 #include "report/render_log.h"

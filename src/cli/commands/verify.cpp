@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cli/logs/logged_run.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
-#include "cli/support/logged_run.h"
 #include "cli/support/sandboxed.h"
 #include "cli/support/signal_thread.h"
 #include "engine/thread_limit.h"

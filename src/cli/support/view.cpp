@@ -11,7 +11,7 @@
 #include <filesystem>
 
 #include "base/whole.h"
-#include "cli/support/logged_run.h"
+#include "cli/logs/logged_run.h"
 #include "console/console.h"
 #include "console/live_source.h"
 #include "console/log_page.h"

@@ -213,15 +213,14 @@ double floor_of(const world::WorldModel& world, const Box& shown) {
 std::optional<double> ceiling_of(const world::WorldModel& world, const Box& shown, double floor) {
   const double whole = shown.sizes().x() * shown.sizes().y();
   Area area;
-  for_each_visual(world,
-                  [&](const world::ModelInstance& instance, const world::Visual& visual,
-                      const Pose& X_WV) {
-                    const Box box = placed(visual.geometry, X_WV);
-                    if (!instance.model->is_static || box.isEmpty() || !shown.intersects(box)) return;
-                    const Area own = area_of(visual, X_WV, floor + kPerson_m);
-                    area.above += own.above;
-                    area.below += own.below;
-                  });
+  for_each_visual(world, [&](const world::ModelInstance& instance, const world::Visual& visual,
+                             const Pose& X_WV) {
+    const Box box = placed(visual.geometry, X_WV);
+    if (!instance.model->is_static || box.isEmpty() || !shown.intersects(box)) return;
+    const Area own = area_of(visual, X_WV, floor + kPerson_m);
+    area.above += own.above;
+    area.below += own.below;
+  });
   if (height_of_ground(world)) area.below += whole;
   // A mountain hides nothing: there is no floor below it.
   if (area.above < kCovered * whole || area.below < kCovered * whole) return std::nullopt;

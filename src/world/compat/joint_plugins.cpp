@@ -249,8 +249,7 @@ void read_joint_interfaces(const Element& model_element, const std::string& wher
     for (const Element* joint : transmission->all("joint")) read(*joint, true);
   }
   for (const Element* system : model_element.all("ros2_control")) {
-    for (const Element* joint : system->all("joint"))
-      read(*joint, joint->has("command_interface"));
+    for (const Element* joint : system->all("joint")) read(*joint, joint->has("command_interface"));
   }
 }
 

@@ -55,13 +55,7 @@ public final class Api {
         Robot robot = sim.robot("arm");
         for (String name : sim.jointLimits("arm").names) {
             Joint joint = robot.joint(name);
-            say(
-                    name,
-                    joint.kind,
-                    joint.takesCommands,
-                    joint.holds,
-                    joint.lower,
-                    joint.upper);
+            say(name, joint.kind, joint.takesCommands, joint.holds, joint.lower, joint.upper);
             say(name + "_most", joint.maxVelocity, joint.maxEffort);
         }
         attempt("unknown", () -> robot.joint("elbo"));
@@ -94,8 +88,7 @@ public final class Api {
         attempt("at_once", () -> robot.commandJoints(Map.of("elbow", 0.1)));
         Observations seen =
                 sim.step(
-                        400,
-                        List.of(robot.jointCommand(Map.of("elbow", 0.1), JointMode.POSITION)));
+                        400, List.of(robot.jointCommand(Map.of("elbow", 0.1), JointMode.POSITION)));
         say("reached", seen.latest(robot.joints()).position("elbow"));
     }
 
@@ -164,8 +157,7 @@ public final class Api {
     private static void geometry(Simulation sim) {
         Transform a = Transform.of(1.0, 2.0, 0.3);
         Transform b =
-                new Transform(
-                        new double[] {0.5, -1.0, 0.25}, new double[] {0.5, 0.5, 0.5, 0.5});
+                new Transform(new double[] {0.5, -1.0, 0.25}, new double[] {0.5, 0.5, 0.5, 0.5});
         Transform product = a.compose(b), identity = product.compose(product.inverse());
         double[] q = product.orientation(), i = identity.orientation();
         say("product", product.x(), product.y(), product.z(), q[0], q[1], q[2], q[3]);

@@ -88,10 +88,7 @@ async function arrange({ page, until, check, picture }) {
   for (const wide of [1900, 1100]) {
     await page.setViewportSize({ width: wide, height: 600 });
     await until("(it is arranged)", (w) => window.innerWidth === w, wide);
-    await page.waitForFunction(
-      (w) => document.getElementById("dock").clientWidth === w,
-      wide,
-    );
+    await page.waitForFunction((w) => document.getElementById("dock").clientWidth === w, wide);
     check(
       `the panel keeps its width in a window of ${wide} pixels`,
       Math.abs((await width()) - kept) < 3,
@@ -220,7 +217,10 @@ async function picks({ page, until, check }) {
           { left, top, width, height } = view.canvas.getBoundingClientRect(),
           { camera } = view.view;
         camera.updateMatrixWorld();
-        const at = camera.position.clone().set(...place).project(camera);
+        const at = camera.position
+          .clone()
+          .set(...place)
+          .project(camera);
         return [left + ((at.x + 1) / 2) * width, top + ((1 - at.y) / 2) * height];
       },
       [x, y, z],

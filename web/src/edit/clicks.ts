@@ -40,17 +40,16 @@ export class Clicks {
 
   // At a point of the page; further: in addition to earlier points.
   click(x: number, y: number, further: boolean, picker: Picker): void {
-    const { page, editor, door } = this,
-      { measured, sent } = this.actions,
+    const { page, editor, door, actions } = this,
       { tool } = page.now,
       picked = picker.pick(x, y);
     if (tool === "wall" || tool === "room") return;
     if (tool === "measure") {
-      if (picked.point) measured(picked.point);
+      if (picked.point) actions.measured(picked.point);
       return;
     }
     if (tool === "go") {
-      if (picked.point) sent(picked.point, further);
+      if (picked.point) actions.sent(picked.point, further);
       return;
     }
     if (tool === "door") return makeDoor(picked.model, picked.point, editor, door);

@@ -65,10 +65,7 @@ export class OverlaySet {
 
   private style(): void {
     for (const [name, overlay] of this.of)
-      overlay.style(
-        (layer) => displayFor(this.page.now.displays, layer, name),
-        this.of.size,
-      );
+      overlay.style((layer) => displayFor(this.page.now.displays, layer, name), this.of.size);
   }
 
   // Moves them with the robots; true if there is something to draw.

@@ -1,6 +1,5 @@
 // What pixels of pictures of labels mean: bodies, or models of a class.
 import type { device_info_t } from "../../generated/messages";
-import type { Source } from "../widgets/picture";
 import type { PageState } from "./page";
 
 const kMostNames = 3; // of a class
@@ -9,7 +8,7 @@ const kMostNames = 3; // of a class
 export function pictureSource(
   { world, scene }: Pick<PageState, "world" | "scene">,
   device: device_info_t | undefined,
-): Source {
+): { kind: string; nameOf: (label: number) => string } {
   const ofClass = (label: number): string[] =>
     (scene?.classes ?? []).filter(([each]) => each === label).flatMap(([, ...models]) => models);
   const kind = device?.kind ?? "";

@@ -303,8 +303,8 @@ public final class Robot {
      * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
      * command of any kind: this program repeats it in the background, so that the watchdog does not
      * stop the robot. It lapses watchdog() s of sim time after the program has ended or was
-     * stopped; {@link #driving} shows in the program how long that is to last. Throws NotSupported for a robot without a drive, and in lockstep, as all that
-     * drives at once.
+     * stopped; {@link #driving} shows in the program how long that is to last. Throws NotSupported
+     * for a robot without a drive, and in lockstep, as all that drives at once.
      */
     public void setVelocity(double v, double omega) {
         setVelocity(v, omega, 0.0);

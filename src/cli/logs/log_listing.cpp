@@ -1,5 +1,5 @@
 // Sizes are in the units of 1000 that `ls -h --si` has.
-#include "cli/support/log_listing.h"
+#include "cli/logs/log_listing.h"
 
 #include <algorithm>
 

@@ -1,10 +1,10 @@
-#include "cli/support/played_run.h"
+#include "cli/logs/played_run.h"
 
 #include <filesystem>
 #include <random>
 
 #include "base/channel_names.h"
-#include "cli/support/logged_run.h"
+#include "cli/logs/logged_run.h"
 #include "engine/outcome.h"
 #include "log/index.h"
 #include "ruedo/decode.h"
@@ -32,15 +32,14 @@ PlayedRun::PlayedRun(const std::string& path, bus::LcmBus& bus) : bus_(bus), run
   worlds_ = std::make_unique<run::LogWorlds>(
       index, [&](const log_header_t& header) { return load_run(header, path); });
   if (!worlds_->fault().empty()) to_stderr("ruedo: {}: {}\n", path, worlds_->fault());
-  bus_.listen(
-      {kRequestChannel},
-      [this](const std::string&, const uint8_t* data, size_t size) {
-        request_t request;
-        if (decode_checked(data, size, request) == DecodeFault::none &&
-            request.kind == request_t::INFO)
-          asked_ = true;
-      },
-      {kInfoChannel, kReplyChannel});
+  bus_.listen({kRequestChannel},
+              [this](const std::string&, const uint8_t* data, size_t size) {
+                request_t request;
+                if (decode_checked(data, size, request) == DecodeFault::none &&
+                    request.kind == request_t::INFO)
+                  asked_ = true;
+              },
+              {kInfoChannel, kReplyChannel});
 }
 
 PlayedRun::~PlayedRun() { bus_.stop(); }

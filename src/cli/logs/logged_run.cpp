@@ -1,5 +1,5 @@
 // The inverse of result_options(), and of what ruedo run adds to them.
-#include "cli/support/logged_run.h"
+#include "cli/logs/logged_run.h"
 
 #include "cli/support/extensions.h"
 #include "log/header.h"
