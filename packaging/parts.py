@@ -13,6 +13,7 @@ import tomllib
 TABLE = tomllib.loads(Path(__file__).with_name("parts.toml").read_text(encoding="utf-8"))
 COMPILED = TABLE["compiled"]["debian"]
 COMPILED_PYPI = TABLE["compiled"]["pypi"]
+SITE = TABLE["site"]["pypi"]  # of which style, scripts and icons are in the documentation's wheel
 # Of each C and C++ program: GCC's runtime exception and the C library's headers ask for nothing.
 OF_EACH_PROGRAM = {"gcc", "glibc", "linux"}
 

@@ -43,6 +43,10 @@ def inside(build: Path, wheels: list[Path]) -> list[Part]:
     for name, (_, _, licence) in parts.COMPILED_PYPI.items():
         version = importlib.metadata.version(name)
         found.append((name, version, licence, f"pkg:pypi/{name}@{version}"))
+    if any(wheel.name.startswith("ruedo_docs-") for wheel in wheels):
+        for name, licence in parts.SITE.items():
+            version = importlib.metadata.version(name)
+            found.append((name, version, licence, f"pkg:pypi/{name}@{version}"))
     for _, name, version, licence in parts.of_npm(build):
         found.append((name, version, licence, f"pkg:npm/{name}@{version}"))
     return found

@@ -3,6 +3,7 @@
     ruedo_client   the Python client, for any platform
     ruedo          the server and what C++ and Java need; depends on the client
     ruedo_camera   the renderer, which is as large as the rest: pip install 'ruedo[camera]'
+    ruedo_docs     the site of the documentation, where BUILD has it (target ruedo-site)
 
 Together they are one package: `ruedo` is the prefix of an installation (bin, lib, include, share)
 and the Python client at once, so that the program, importer, worlds, C++ package and jar are found
@@ -24,6 +25,10 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "packaging"))
+
+import parts  # noqa: E402
+
 PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
 # What Debian's libraries are linked to and nothing here calls, by the library that is: most of them
 # some 10 MB.
@@ -202,8 +207,8 @@ def metadata(build: Path, name: str, version: str, summary: str, requires: list[
         *(f"Requires-Dist: {one}" for one in requires),
     ]
     if name == "ruedo":
-        extras += f'camera = ["ruedo-camera=={version}"]\n'
-    for line in extras.splitlines() if name != "ruedo-camera" else ():
+        extras += f'camera = ["ruedo-camera=={version}"]\ndocs = ["ruedo-docs=={version}"]\n'
+    for line in extras.splitlines() if name in ("ruedo", "ruedo-client") else ():
         extra, names = line.split(" = ", 1)
         lines.append(f"Provides-Extra: {extra}")
         lines += [
@@ -231,15 +236,17 @@ def describe(build: Path, wheel: Path, name: str, version: str, tag: str) -> Non
         "ruedo": "A simulation server for mobile robots, with its clients for Python, C++ and Java",
         "ruedo-client": "The Python client of Ruedo, a simulation server for mobile robots",
         "ruedo-camera": "The renderer of Ruedo, a simulation server for mobile robots",
+        "ruedo-docs": "The documentation of Ruedo, a simulation server for mobile robots",
     }
     requires = {
         "ruedo": [f"ruedo-client=={version}"],
         "ruedo-client": client_requires(),
         "ruedo-camera": [f"ruedo=={version}"],
+        "ruedo-docs": [f"ruedo=={version}"],
     }
     text = metadata(build, name, version, summaries[name], requires[name])
     (info / "METADATA").write_text(text, encoding="utf-8")
-    pure = "true" if name == "ruedo-client" else "false"
+    pure = "true" if name in ("ruedo-client", "ruedo-docs") else "false"
     (info / "WHEEL").write_text(
         f"Wheel-Version: 1.0\nGenerator: ruedo\nRoot-Is-Purelib: {pure}\nTag: {tag}\n"
     )
@@ -298,6 +305,22 @@ def split(everything: Path, client: Path, camera: Path) -> None:
     for name in reached([renderer], libraries) - reached(others, libraries):
         move(libraries / name, camera)
     move(renderer, camera)
+
+
+def pack_docs(build: Path, tree: Path, out: Path, version: str, level: int) -> list[Path]:
+    """The wheel of the site, with the licences of what others wrote in it; [] without a site."""
+    if not (build / "site/index.html").is_file():
+        return []
+    shutil.copytree(build / "site", tree / "ruedo/share/doc/ruedo/site")
+    describe(build, tree, "ruedo-docs", version, "py3-none-any")
+    licenses = next(tree.glob("*.dist-info")) / "licenses"
+    for package in parts.SITE:
+        for number, text in enumerate(parts.licences_of_python(package.replace("-", "_"))):
+            (licenses / package).mkdir(parents=True, exist_ok=True)
+            shutil.copy(text, licenses / package / f"{number}-{text.name}")
+    file = out / f"ruedo_docs-{version}-py3-none-any.whl"
+    pack(tree, file, level)
+    return [file]
 
 
 def without_copies(package: Path) -> None:
@@ -372,7 +395,8 @@ def main(build: Path, out: Path, level: int) -> list[Path]:
         for name, file in made.items():
             add_licences(tree / name)
             pack(tree / name, out / file, level)
-    return [out / file for file in made.values()]
+        documentation = pack_docs(build, tree / "docs", out, version, level)
+    return [*(out / file for file in made.values()), *documentation]
 
 
 if __name__ == "__main__":

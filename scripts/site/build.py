@@ -17,14 +17,29 @@ def main(build: Path, folder: Path) -> None:
         "RUEDO": str(build / "bin/ruedo"),
         "RUEDO_PYTHON_PACKAGE": str(build / "python"),
         "RUEDO_CPP_PAGES": str(build / "docs/api"),
-        "RUEDO_JAVA_PAGES": str(build / "docs/java"),
+        "RUEDO_JAVA_PAGES": str(build / "java/work/javadoc"),
     }
     subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "-f", ROOT / "mkdocs.yml", "-d", folder],
+        [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--quiet",
+            "--strict",
+            "-f",
+            ROOT / "mkdocs.yml",
+            "-d",
+            folder,
+        ],
         env=environment,
         check=True,
     )
-    for unused in (*folder.rglob("*.map"), folder / "assets/javascripts/lunr", folder / "sitemap.xml.gz"):
+    for unused in (
+        *folder.rglob("*.map"),
+        folder / "assets/javascripts/lunr",
+        folder / "sitemap.xml.gz",
+    ):
         shutil.rmtree(unused) if unused.is_dir() else unused.unlink()
 
 

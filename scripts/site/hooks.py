@@ -13,7 +13,11 @@ from pathlib import Path
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[2]
-FROM_THE_TOP = {"CONTRIBUTING.md": "contributing.md", "SECURITY.md": "security.md", "CHANGELOG.md": "changelog.md"}
+FROM_THE_TOP = {
+    "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
+    "CHANGELOG.md": "changelog.md",
+}
 FENCES = re.compile(r"(^ *```.*?^ *```$)", re.MULTILINE | re.DOTALL)
 BEFORE_LIST = re.compile(r"^((?![-*|#>]|\d+\. ).+)\n(?=(- |\d+\. )\S)", re.MULTILINE)
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)")
@@ -21,13 +25,17 @@ LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)")
 
 def help_of(words):
     program = os.environ.get("RUEDO", str(ROOT / "build/release/bin/ruedo"))
-    return subprocess.run([program, *words, "--help"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return subprocess.run(
+        [program, *words, "--help"], stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
 
 
 def commands_page():
-    """The help of each command. One whose help Python prints stands with its line of the summary."""
+    """The help of each command; its line of the summary where the help fails."""
     summary = help_of([])
-    names = re.findall(r"^  ([a-z][a-z0-9-]+) {2,}(\S.*)$", summary.partition("Subcommands:")[2], re.MULTILINE)
+    names = re.findall(
+        r"^  ([a-z][a-z0-9-]+) {2,}(\S.*)$", summary.partition("Subcommands:")[2], re.MULTILINE
+    )
     parts = ["# Commands\n\n`ruedo COMMAND --help` prints the same.\n"]
     for name, about in names:
         try:
@@ -40,7 +48,9 @@ def commands_page():
 
 def on_files(files, config):
     for source, name in FROM_THE_TOP.items():
-        files.append(File.generated(config, name, content=(ROOT / source).read_text(encoding="utf-8")))
+        files.append(
+            File.generated(config, name, content=(ROOT / source).read_text(encoding="utf-8"))
+        )
     files.append(File.generated(config, "commands.md", content=commands_page()))
     return files
 
@@ -55,7 +65,7 @@ def target_of(page, link):
     file = (folder / path).resolve()
     if file.parent == ROOT and file.name in FROM_THE_TOP:
         inside = FROM_THE_TOP[file.name]
-    elif file.is_file() and file.is_relative_to(ROOT / "docs") and file.suffix != ".py":
+    elif file.is_file() and file.is_relative_to(ROOT / "docs"):
         inside = str(file.relative_to(ROOT / "docs"))
     elif not file.exists() and not top:
         return link  # a page that is generated
@@ -66,6 +76,8 @@ def target_of(page, link):
 
 def on_page_markdown(markdown, page, config, files):
     name = page.file.src_uri
+    if page.parent is None:
+        page.meta["hide"] = ["navigation"]  # there are no pages beside it
     if name == "contributing.md":  # Python's Markdown indents lists by four columns
         markdown = re.sub(r"^   (?=\S)", "    ", markdown, flags=re.MULTILINE)
 

@@ -15,7 +15,9 @@ sys.path.insert(0, str(ROOT / "tests/console"))
 from harness import BUILD, browse, needs_browser, serving
 
 PAGE = (ROOT / "docs/getting-started.md").read_text(encoding="utf-8")
-PROGRAMS = dict(re.findall(r'^```python title="(\w+\.py)"\n(.*?)^```', PAGE, re.MULTILINE | re.DOTALL))
+PROGRAMS = dict(
+    re.findall(r'^```python title="(\w+\.py)"\n(.*?)^```', PAGE, re.MULTILINE | re.DOTALL)
+)
 
 
 def run(program, folder):

@@ -1,11 +1,12 @@
-"""The site: it builds without a warning, loads nothing from elsewhere, its first page has five links
-for each reader, and its prose stays short.
+"""The site: it builds without a warning, loads nothing from elsewhere, its first page has five
+links for each reader, and its prose stays short.
 """
 
 import os
 import re
 import subprocess
 import sys
+import urllib.request
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,10 +15,22 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("RUEDO_BINARY_DIR", ROOT / "build/release"))
 # Pages whose tables and texts scripts write from measurements or from proto/.
-APPENDIX = {"corpus.md", "experiments.md", "messages.md", "performance.md", "physics.md", "reality.md", "robots/README.md"}
+APPENDIX = {
+    "corpus.md",
+    "experiments.md",
+    "messages.md",
+    "performance.md",
+    "physics.md",
+    "reality.md",
+    "robots/README.md",
+}
 PAGES = [
     *(ROOT / name for name in ("CONTRIBUTING.md", "SECURITY.md", "README.md")),
-    *(p for p in sorted((ROOT / "docs").rglob("*.md")) if str(p.relative_to(ROOT / "docs")) not in APPENDIX),
+    *(
+        p
+        for p in sorted((ROOT / "docs").rglob("*.md"))
+        if str(p.relative_to(ROOT / "docs")) not in APPENDIX
+    ),
 ]
 MOST_BYTES = 200_000
 READERS = ["Student", "ROS developer", "Engineer with CI", "Researcher who trains", "Maintainer"]
@@ -54,8 +67,8 @@ def parsed(page):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("site")
+def site():
+    folder = BUILD / "site"
     result = subprocess.run(
         [sys.executable, ROOT / "scripts/site/build.py", BUILD, folder],
         capture_output=True,
@@ -74,13 +87,20 @@ def test_pages_load_nothing_from_elsewhere(site):
         for address in parsed(page).loads:
             assert not re.match(r"(https?:)?//", address), f"{page.name}: {address}"
     for sheet in site.rglob("*.css"):
-        for address in re.findall(r"(?:url|@import)\s*\(?['\"]?((?:https?:)?//[^'\")]+)", sheet.read_text(encoding="utf-8")):
+        for address in re.findall(
+            r"(?:url|@import)\s*\(?['\"]?((?:https?:)?//[^'\")]+)",
+            sheet.read_text(encoding="utf-8"),
+        ):
             pytest.fail(f"{sheet.name}: {address}")
 
 
 def test_links_of_the_site_lead_somewhere(site):
     for page in site.rglob("*.html"):
-        if page.is_relative_to(site / "api/cpp") or page.is_relative_to(site / "api/java") or page.name == "404.html":
+        if (
+            page.is_relative_to(site / "api/cpp")
+            or page.is_relative_to(site / "api/java")
+            or page.name == "404.html"
+        ):
             continue
         for link in parsed(page).links:
             path = link.partition("#")[0].partition("?")[0]
@@ -99,7 +119,11 @@ def test_there_is_a_page_of_each_command_sample_and_class(site):
     for page, words in {
         "commands.html": ["regress", "nav2-params", "--lockstep"],
         "messages.html": ["Odometry", "GET_STATE"],
-        "api/python.html": ["ruedo.robot.Robot.advance", "ruedo.engine.Engine.observe", "ruedo.world.World.wall"],
+        "api/python.html": [
+            "ruedo.robot.Robot.advance",
+            "ruedo.engine.Engine.observe",
+            "ruedo.world.World.wall",
+        ],
         "world-files.html": ["ruedo:watchdog"],
     }.items():
         text = (site / page).read_text(encoding="utf-8")
@@ -121,7 +145,9 @@ def test_each_reader_has_five_links():
 
 
 def test_prose_is_short():
-    sizes = {str(p.relative_to(ROOT)): len(prose(p.read_text(encoding="utf-8")).encode()) for p in PAGES}
+    sizes = {
+        str(p.relative_to(ROOT)): len(prose(p.read_text(encoding="utf-8")).encode()) for p in PAGES
+    }
     longest = sorted(sizes.items(), key=lambda item: -item[1])[:8]
     print(f"prose: {sum(sizes.values())} bytes of {len(sizes)} pages; longest: {longest}")
     assert sum(sizes.values()) <= MOST_BYTES, longest
@@ -129,3 +155,21 @@ def test_prose_is_short():
 
 def test_prose_is_what_is_left_of_a_page():
     assert prose("a\n```sh\nb\n```\n| c |\n    d\n<!-- e -->\nf") == "a\n\n\nf"
+
+
+def test_ruedo_docs_serves_it(site):
+    environment = os.environ | {
+        "RUEDO": str(BUILD / "bin/ruedo"),
+        "PYTHONPATH": str(BUILD / "python"),
+    }
+    program = "import sys; from ruedo.docs import main; sys.exit(main(['docs', *sys.argv[1:]]))"
+    words = [sys.executable, "-c", program, "--no-browser"]
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            address = re.search(r"http://127\.0\.0\.1:\d+/index\.html", process.stdout.readline())[
+                0
+            ]
+            with urllib.request.urlopen(address, timeout=30) as answer:
+                assert b"Ten minutes" in answer.read()
+        finally:
+            process.terminate()

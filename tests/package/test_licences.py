@@ -23,7 +23,7 @@ SPDX = set(
     re.findall(
         r"\S+",
         """
-    Apache-2.0 BSD-2-Clause BSD-3-Clause BSL-1.0 CC0-1.0 EPL-2.0 GPL-2.0-only IJG LGPL-2.1-only
+    Apache-2.0 BSD-2-Clause BSD-3-Clause BSL-1.0 CC0-1.0 EPL-2.0 GPL-2.0-only IJG ISC LGPL-2.1-only
     LGPL-2.1-or-later LLVM-exception LicenseRef-public-domain MIT MPL-2.0
     X11-distribute-modifications-variant Zlib libpng-2.0 libtiff
     """,

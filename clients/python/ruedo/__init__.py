@@ -2,15 +2,31 @@
 
     import ruedo
 
-    with ruedo.connect() as sim:
+    with ruedo.launch("arena") as sim:          # a server of its own, which waits for this program
         robot = sim.robot("p3at")
         robot.set_velocity(0.3, 0.0)            # m/s, rad/s; holds until changed
         while robot.lrf.next().nearest(-0.5, 0.5) > 0.8:
             pass
         robot.stop().wait()
 
-Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the message types
-themselves.
+Begin      launch(world)      a private server; connect() joins one that runs
+           World()            a world that the program builds
+           Engine(world)      many worlds in this process, without a server
+Use        Simulation         robots, time, sleep, step, pause, reset, spawn, set_pose, state
+           Robot              set_velocity, stop, advance, rotate, turn_to, arc; its sensors
+           Device, Stream     latest(), next(), on_sample() of a sensor
+           Motion             wait(), done, reason of a primitive
+           Command            what acts at a step of lockstep
+Samples    Scan, Odometry, Pose, Image, Imu, ...: fields with units
+Logs       open_log(file)     arrays by channel and time; read_log(file) gives data frames
+           load_map(file)     an occupancy map
+Errors     RuedoError         and below it NoServer, Timeout, MotionError, UnknownName, ...
+Modules    ruedo.markers      what programs draw for people
+           ruedo.gym          environments for learning
+           ruedo.lcmtypes     the message types themselves
+
+Units are SI, angles radians; x ahead, y left, z up. `help(ruedo.Robot)` and so on has the details,
+`dir(ruedo)` every name, and the command `ruedo docs` opens the documentation.
 """
 
 from importlib.util import find_spec
@@ -142,3 +158,14 @@ __all__ = [
 __all__ += samples.__all__ + vocabulary.__all__
 if find_spec("ruedo._engine"):
     __all__ += ["Engine", "SavedWorld"]
+
+
+class _Names(list[str]):
+    """`help(ruedo)` asks which names are in ``__all__``, and would print each class in full."""
+
+    def __contains__(self, name: object) -> bool:
+        return False
+
+
+if not TYPE_CHECKING:
+    __all__ = _Names(__all__)  # noqa: PLE0605

@@ -1,4 +1,4 @@
-// ruedo campaign, hunt, why and fit: written in Python, in the package `ruedo` of this
+// ruedo campaign, hunt, why, fit and docs: written in Python, in the package `ruedo` of this
 // installation, which this hands over to.
 #include "cli/support/commands.h"
 #include "cli/support/python.h"
@@ -40,6 +40,7 @@ void add_python_commands(CLI::App& app, Action& chosen) {
        campaigns, extras});
   add(app, chosen,
       {"fit", "fit a robot's errors to logs of the real one", "ruedo.fit.cli", "'ruedo[fit]'"});
+  add(app, chosen, {"docs", "open the documentation in a browser", "ruedo.docs", "'ruedo[docs]'"});
 }
 
 const RegisterCommand kRegister{56, add_python_commands};
