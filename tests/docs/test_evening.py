@@ -41,7 +41,7 @@ def folder(tmp_path_factory):
     """With the world that was drawn."""
     folder = tmp_path_factory.mktemp("evening")
     with serving("edit", "room.sdf", "--view", "127.0.0.1:0", cwd=folder) as process:
-        browse(process.url, folder, "../docs/evening")
+        browse(process.url, folder, "../../docs/evening")
     return folder
 
 
