@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import urllib.request
+import zipfile
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -173,3 +174,18 @@ def test_ruedo_docs_serves_it(site):
                 assert b"Ten minutes" in answer.read()
         finally:
             process.terminate()
+
+
+def test_its_wheel_is_small_and_has_licences(site, tmp_path):
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import make_wheel
+
+    (tmp_path / "tree").mkdir()
+    (file,) = make_wheel.pack_docs(BUILD, tmp_path / "tree", tmp_path, "0.1.0", 9)
+    assert file.stat().st_size < 6e6
+    names = zipfile.ZipFile(file).namelist()
+    assert "ruedo/share/doc/ruedo/site/index.html" in names
+    for package in ("mkdocs", "mkdocs-material", "mkdocstrings-python"):
+        assert any(f"/licenses/{package}/" in name for name in names), package
+    nothing = tmp_path / "a build without a site"
+    assert make_wheel.pack_docs(nothing, tmp_path / "none", tmp_path, "0.1.0", 1) == []
