@@ -13,8 +13,11 @@ from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "console"))
+from harness import CHROMIUM, NODE, needs_browser
+
 ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("RUEDO_BINARY_DIR", ROOT / "build/release"))
+BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 # Pages whose tables and texts scripts write from measurements or from proto/.
 APPENDIX = {
     "corpus.md",
@@ -189,3 +192,19 @@ def test_its_wheel_is_small_and_has_licences(site, tmp_path):
         assert any(f"/licenses/{package}/" in name for name in names), package
     nothing = tmp_path / "a build without a site"
     assert make_wheel.pack_docs(nothing, tmp_path / "none", tmp_path, "0.1.0", 1) == []
+
+
+@needs_browser
+def test_pages_fit_a_desktop_and_a_phone(site):
+    pages = [str(page.relative_to(site)) for page in sorted(site.rglob("*.html"))]
+    own = [page for page in pages if not page.startswith(("api/cpp", "api/java", "404"))]
+    result = subprocess.run(
+        [NODE, ROOT / "tests/docs/pages.mjs", site, *own],
+        cwd=BUILD / "web",
+        env=os.environ | {"CHROMIUM": CHROMIUM},
+        capture_output=True,
+        text=True,
+        timeout=1500,
+        check=False,
+    )
+    assert (result.returncode, result.stdout) == (0, ""), result.stdout + result.stderr
