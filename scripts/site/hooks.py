@@ -76,6 +76,10 @@ def target_of(page, link):
 
 def on_page_markdown(markdown, page, config, files):
     name = page.file.src_uri
+    for folder, pages in others() if name == "api/others.md" else ():
+        if not pages:
+            link = rf'<a href="{Path(folder).name}/index.html">(.*?)</a>'
+            markdown = re.sub(link, r"\1 (not in this build)", markdown)
     if page.parent is None:
         page.meta["hide"] = ["navigation"]  # there are no pages beside it
     if name == "contributing.md":  # Python's Markdown indents lists by four columns
@@ -95,9 +99,14 @@ def on_page_markdown(markdown, page, config, files):
     return "".join(parts)
 
 
-def on_post_build(config):
-    """The API's pages of Doxygen and javadoc, where a build has made them."""
+def others():
+    """(the folder in the site, its pages) of Doxygen and javadoc, or None where no build made them."""
     for variable, folder in (("RUEDO_CPP_PAGES", "api/cpp"), ("RUEDO_JAVA_PAGES", "api/java")):
-        pages = os.environ.get(variable)
-        if pages and Path(pages).is_dir():
+        pages = Path(os.environ.get(variable, ""))
+        yield folder, pages if (pages / "index.html").is_file() else None
+
+
+def on_post_build(config):
+    for folder, pages in others():
+        if pages:
             shutil.copytree(pages, Path(config.site_dir) / folder, dirs_exist_ok=True)
