@@ -25,6 +25,7 @@ APPENDIX = {
     "messages.md",
     "performance.md",
     "physics.md",
+    "public-worlds.md",
     "reality.md",
     "robots/README.md",
 }
