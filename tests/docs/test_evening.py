@@ -47,10 +47,10 @@ def folder(tmp_path_factory):
 
 @needs_browser
 def test_the_robot_drives_in_the_world_that_was_drawn(folder):
-    x, y, bumps = (float(word) for word in run("drive.py", folder).split()[-3:])
+    (line,) = run("drive.py", folder).splitlines()  # a collision would be another one
+    x, y = map(float, line.split())
     # A room of 4 x 3 m about the origin: it has gone somewhere, and it is still inside.
     assert abs(x) < 2 and abs(y) < 1.5 and (x + 0.8) ** 2 + (y + 0.5) ** 2 > 0.1
-    assert bumps == 0
 
 
 @needs_browser
