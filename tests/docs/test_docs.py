@@ -7,10 +7,12 @@ a Python program finds a server with worlds/arena.sdf, and goes to pytest when i
 to files are followed, too.
 """
 
+import functools
 import os
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -96,6 +98,51 @@ def test_links_lead_somewhere(document):
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", prose):
         if "://" not in target:
             assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+COMMAND = re.compile(r"(?:^ +|`|^)ruedo ([a-z][a-z0-9-]*)((?: [^`\n]*)?)", re.MULTILINE)
+
+
+def commands(text):
+    """(command, its options) of each `ruedo COMMAND ...` in a page, run by a test or not."""
+    for match in COMMAND.finditer(text.replace("\\\n", " ")):
+        words = re.sub(r'"[^"]*"|#.*', "", match[2])  # a client's own options
+        yield match[1], set(re.findall(r"(?<![\w-])--([a-z][\w-]*)", words.partition(" && ")[0]))
+
+
+@functools.cache
+def options_of(command):
+    """Those that its help lists, and those of its own commands."""
+
+    def said(*words):
+        python = os.pathsep.join(
+            [str(BINARIES.parent / "python"), os.environ.get("PYTHONPATH", "")]
+        )
+        environment = os.environ | {"RUEDO_PYTHON": sys.executable, "PYTHONPATH": python}
+        return subprocess.run(
+            [BINARIES / "ruedo", *words, "--help"],
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+            timeout=TIMEOUT_S,
+            check=True,
+        ).stdout
+
+    text = said(command)
+    for one in re.findall(r"^ +([a-z]+\|[a-z|]+)$", text, re.MULTILINE)[:1]:
+        text += "".join(said(command, word) for word in one.split("|"))
+    return set(re.findall(r"(?<![\w-])--([a-z][\w-]*)", text)) | {"help"}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(ROOT)))
+def test_options_of_commands_exist(document):
+    for command, options in commands(document.read_text(encoding="utf-8")):
+        assert options <= options_of(command), (command, options - options_of(command))
+
+
+def test_commands_are_found():
+    text = "`ruedo map w --height`\n    ruedo run W --client \"x --y\" --rate max  # --z\n"
+    assert list(commands(text)) == [("map", {"height"}), ("run", {"client", "rate"})]
 
 
 def test_packages_of_the_scripts_are_listed():
