@@ -7,7 +7,19 @@ import subprocess
 import sys
 
 import pytest
-from conftest import APIS, BUILD, HALL, PATIENCE, RUEDO, Said, Server, chosen, free_url, ruedo_run, tcp_server
+from conftest import (
+    APIS,
+    BUILD,
+    HALL,
+    PATIENCE,
+    RUEDO,
+    Said,
+    Server,
+    chosen,
+    free_url,
+    ruedo_run,
+    tcp_server,
+)
 
 
 @pytest.fixture(params=list(chosen(APIS)))
@@ -45,10 +57,26 @@ ARM = (
         f"<joint name='{name}' type='{kind}'><parent>{parent}</parent><child>{child}</child><axis><xyz>0 1 0</xyz>"
         f"{mimic}{servo}<limit>{limit}</limit></axis></joint>"
         for name, parent, child, kind, limit, servo, mimic in (
-            ("shoulder", "base", "upper", "revolute", "<lower>-1.5</lower><upper>1.5</upper><velocity>2</velocity><effort>80</effort>", SERVO, ""),
+            (
+                "shoulder",
+                "base",
+                "upper",
+                "revolute",
+                "<lower>-1.5</lower><upper>1.5</upper><velocity>2</velocity><effort>80</effort>",
+                SERVO,
+                "",
+            ),
             ("elbow", "upper", "fore", "continuous", "<effort>60</effort>", SERVO, ""),
             ("wrist", "fore", "hand", "revolute", "<lower>-1</lower><upper>0.75</upper>", "", ""),
-            ("finger", "hand", "tip", "revolute", "<lower>-1</lower><upper>1</upper>", "", "<mimic joint='wrist'><multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>"),
+            (
+                "finger",
+                "hand",
+                "tip",
+                "revolute",
+                "<lower>-1</lower><upper>1</upper>",
+                "",
+                "<mimic joint='wrist'><multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>",
+            ),
             ("swing", "base", "bob", "continuous", "", "", ""),
         )
     )
@@ -79,7 +107,9 @@ def test_joints_by_their_names(language, arm):
         assert said.one(key) == f"UnknownName: arm has no joint 'elbo'; it has {names}"
     assert said.one("unknown_state") == f"UnknownName: there is no joint 'elbo'; there is {names}"
     assert said.one("nan").startswith("ValueError: elbow is nan") or "NaN" in said.one("nan")
-    assert said.one("mimic").startswith("NotSupported: ") and "takes no commands" in said.one("mimic")
+    assert said.one("mimic").startswith("NotSupported: ") and "takes no commands" in said.one(
+        "mimic"
+    )
     # The elbow was commanded nothing: its servo holds it against the moment of what it carries.
     assert said.numbers("reached") == pytest.approx([0.5, -0.25, 0.0], abs=2e-3)
     assert said.numbers("velocity") == pytest.approx([0.2], abs=1e-3)
@@ -211,12 +241,16 @@ def test_a_log_that_is_played_feeds_the_program_that_drove(tmp_path):
 def test_launch_has_options_by_name_and_suggests(tmp_path):
     import ruedo
 
-    with pytest.raises(TypeError, match=r"launch\(\) has no option lockstpe: did you mean lockstep\?"):
+    with pytest.raises(
+        TypeError, match=r"launch\(\) has no option lockstpe: did you mean lockstep\?"
+    ):
         ruedo.launch(HALL, lockstpe=1)
     with pytest.raises(TypeError, match=r"no option worlds_; it has world, |did you mean"):
         ruedo.launch(HALL, worlds_=1)
     with (
-        pytest.warns(DeprecationWarning, match=r"launch\(set=\.\.\.\) is deprecated: it is settings"),
+        pytest.warns(
+            DeprecationWarning, match=r"launch\(set=\.\.\.\) is deprecated: it is settings"
+        ),
         ruedo.launch(HALL, lockstep=1, set={"p3at/lrf.range.max": 3.0}) as sim,
     ):
         assert sim.robot("p3at").lrf.range_max == 3.0

@@ -21,7 +21,14 @@ def test_dir_has_what_a_user_should_see_and_nothing_else():
     names = dir(ruedo)
     for name in ("Engine", "launch", "connect", "Map", "Transform", "Joint", "World", "Scan"):
         assert name in names
-    for name in ("find_spec", "SimpleNamespace", "TYPE_CHECKING", "load_glib", "arguments", "stream"):
+    for name in (
+        "find_spec",
+        "SimpleNamespace",
+        "TYPE_CHECKING",
+        "load_glib",
+        "arguments",
+        "stream",
+    ):
         assert name not in names
     assert not [name for name in names if name.startswith("_") and not name.startswith("__")]
 
@@ -55,7 +62,11 @@ def test_snippets_of_the_documentation_pass_the_type_checkers(checker, tmp_path)
     done = subprocess.run(
         [program, *(options if checker == "mypy" else ["--pythonpath", sys.executable]), *files],
         cwd=tmp_path,
-        env={"PATH": "/usr/bin:/bin", "MYPYPATH": str(BUILD / "python"), "PYTHONPATH": str(BUILD / "python")},
+        env={
+            "PATH": "/usr/bin:/bin",
+            "MYPYPATH": str(BUILD / "python"),
+            "PYTHONPATH": str(BUILD / "python"),
+        },
         capture_output=True,
         text=True,
     )

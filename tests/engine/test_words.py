@@ -28,9 +28,7 @@ def test_a_program_moves_from_one_to_the_other(tmp_path):
     expected = pytest.approx((1.0, 1.5, 1.0, 0.0), abs=1e-9)
     with ruedo.Engine(text=TEXT, disable=["p3at/camera"]) as sim:
         assert program(sim, lambda s: sim.step(n=round(s / sim.step_size))) == expected
-    with ruedo.launch(
-        text=TEXT, paused=True, snapshots=tmp_path, disable=["p3at/camera"]
-    ) as sim:
+    with ruedo.launch(text=TEXT, paused=True, snapshots=tmp_path, disable=["p3at/camera"]) as sim:
 
         def step(seconds):
             sim.step(n=round(seconds / sim.step_size))

@@ -70,7 +70,8 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .launch import find_ruedo, launch
     from .lockstep import Command, Message, Observations
     from .logs import Log, LogChannel, open_log, read_log
-    from .maps import Map, OccupancyMap, load_map
+    from .maps import Map, load_map
+    from .maps import OccupancyMap as OccupancyMap
     from .motion import Motion
     from .robot import Camera, Device, Robot
     from .samples import *  # noqa: F403

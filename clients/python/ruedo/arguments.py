@@ -160,10 +160,14 @@ def options(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
                 now = renamed.get(old)
                 if now is None or now in named:
                     near = difflib.get_close_matches(old, allowed, 1)
-                    hint = f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
+                    hint = (
+                        f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
+                    )
                     raise TypeError(f"{what}() has no option {old}{hint}")
                 warnings.warn(
-                    f"{what}({old}=...) is deprecated: it is {now}", DeprecationWarning, stacklevel=2
+                    f"{what}({old}=...) is deprecated: it is {now}",
+                    DeprecationWarning,
+                    stacklevel=2,
                 )
                 named[now] = named.pop(old)
             return call(*given, **named)

@@ -108,8 +108,9 @@ class Engine:
     :class:`World`; with ``text``, what the text is called. worlds: how many copies. seed: of copy
     0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0
     for all. spawn
-    ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), settings ({"p3at/LRF.update_rate":
-    10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
+    ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), settings
+    ({"p3at/LRF.update_rate": 10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are
+    those of ``ruedo run``.
     randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
     "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. plugin: shared libraries with
     sensors or drives of your own, which stay for the life of the process. record: keep the messages
@@ -440,10 +441,10 @@ class Engine:
         """What was drawn for a copy, by target, from ``randomize`` and its seed.
 
         Targets are MODEL.x, .y, .z and .yaw (where it stands at the start), MODEL.mass (a factor),
-        MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``settings``; "*" in MODEL
-        or LIGHT stands for any text, and each that it names draws for itself. Distributions are
-        uniform(LOW, HIGH), log_uniform(LOW, HIGH), normal(MEAN, STDDEV) and choice(VALUE, ...). A
-        value depends on the seed and its target alone. Robots that are put somewhere are drawn
+        MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``settings``; "*" in
+        MODEL or LIGHT stands for any text, and each that it names draws for itself. Distributions
+        are uniform(LOW, HIGH), log_uniform(LOW, HIGH), normal(MEAN, STDDEV) and choice(VALUE, ...).
+        A value depends on the seed and its target alone. Robots that are put somewhere are drawn
         again while they would share space with something.
         """
         return dict(self._core.drawn(self._checked(world)))

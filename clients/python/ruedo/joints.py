@@ -88,7 +88,9 @@ class Joint:
         return self._robot.joints.latest()
 
     def __repr__(self) -> str:
-        return f"<Joint {self._robot.name}/{self.name}: {self.kind}, {self.lower:g} to {self.upper:g}>"
+        return (
+            f"<Joint {self._robot.name}/{self.name}: {self.kind}, {self.lower:g} to {self.upper:g}>"
+        )
 
 
 class JointStream(Stream[Joints]):
@@ -135,7 +137,9 @@ def checked(robot: str, limits: JointLimits, name: str) -> str:
 
 
 def message(robot: str, limits: JointLimits, values: Mapping[str, float], mode: str) -> Any:
-    """A joint_command_t without its time. Raises UnknownName, NotSupported, TypeError, ValueError."""
+    """A joint_command_t without its time. Raises UnknownName, NotSupported, TypeError and
+    ValueError.
+    """
     if not isinstance(values, Mapping):
         raise TypeError(f'values is a dict, {{"elbow": 0.3}}, not {shown(values)}')
     modes = {str(one): number for number, one in JOINT_MODES.items()}
@@ -147,7 +151,9 @@ def message(robot: str, limits: JointLimits, values: Mapping[str, float], mode: 
         if mode not in _OF_OTHERS:
             index = limits.names.index(checked(robot, limits, name))
             if not limits.takes_commands[index]:
-                raise NotSupported(f"the {limits.kinds[index]} joint {name} of {robot} takes no commands")
+                raise NotSupported(
+                    f"the {limits.kinds[index]} joint {name} of {robot} takes no commands"
+                )
         command.name.append(text("name", name))
         command.value.append(finite(name, value))
     command.mode = bytes([modes[mode]] * command.n)

@@ -113,9 +113,7 @@ class Map:
         cells.setflags(write=False)
         return Map(cells, self.resolution, self.origin)
 
-    def ray(
-        self, x: ArrayLike, y: ArrayLike, angle: ArrayLike, max_range: float = 30.0
-    ) -> Any:
+    def ray(self, x: ArrayLike, y: ArrayLike, angle: ArrayLike, max_range: float = 30.0) -> Any:
         """How far a ray goes (m) from a place (m) in a direction (rad, of the world) until it
         enters an occupied cell: +inf where it meets none within max_range, 0 from within one. For
         arrays, which broadcast, an array. Goes from cell to cell (Amanatides and Woo 1987)."""

@@ -194,7 +194,7 @@ class World:
         )
 
     def person(self, path: Way, *, name: str = "person") -> World:
-        """A person who walks along a path, again and again: (s, x, y) or (s, x, y, heading) each."""
+        """A person who walks along a path, again and again; path: (s, x, y) or (s, x, y, heading)."""
         points = "".join(
             f"<waypoint><time>{point[0]!r}</time><pose>{point[1]!r} {point[2]!r} 0 0 0 {point[3]!r}</pose></waypoint>"
             for point in _points(path)

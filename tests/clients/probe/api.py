@@ -1,6 +1,7 @@
 """What textbook programs use of the client, in Python; api.cpp and Api.java are its twins, with the
 same commands and output."""
 
+import itertools
 import sys
 
 import ruedo
@@ -67,7 +68,7 @@ def in_step(sim):
         pairs += 1
         if pairs == 10:
             break
-    say("joined", pairs, worst, all(b > a for a, b in zip(stamps, stamps[1:])))
+    say("joined", pairs, worst, all(b > a for a, b in itertools.pairwise(stamps)))
     between = robot.pose.at(stamps[-1] - 7_000)  # poses come each 20 ms
     before, after = robot.pose.at(stamps[-1] - 20_000), robot.pose.at(stamps[-1])
     share = 13.0 / 20.0
@@ -76,17 +77,15 @@ def in_step(sim):
     scans = [robot.lrf.at(stamps[-1] + 130_000, PATIENCE).utime - stamps[-1]]  # each 100 ms
     say("nearest", *scans)
     attempt("early", lambda: robot.odometry.at(0))
-    count = 0
-    for scan in robot.lrf:
-        count += 1
-        if count == 3:
+    for count, _ in enumerate(robot.lrf):
+        if count == 2:
             break
     times = []
     for t in sim.every(0.25):
         times.append(t)
         if len(times) == 4:
             break
-    say("every", *(b - a for a, b in zip(times, times[1:])), (times[0] / 0.25) % 1.0)
+    say("every", *(b - a for a, b in itertools.pairwise(times)), (times[0] / 0.25) % 1.0)
     attempt("period", lambda: sim.every(0.0))
     sim.quit()
     say("ended", sum(1 for _ in robot.lrf) < 1000, sum(1 for _ in sim.every(0.1)) < 1000)
@@ -105,7 +104,10 @@ def bodies(sim):
 
 
 def geometry(sim):
-    a, b = ruedo.Transform.of(1.0, 2.0, 0.3), ruedo.Transform((0.5, -1.0, 0.25), (0.5, 0.5, 0.5, 0.5))
+    a, b = (
+        ruedo.Transform.of(1.0, 2.0, 0.3),
+        ruedo.Transform((0.5, -1.0, 0.25), (0.5, 0.5, 0.5, 0.5)),
+    )
     product = a @ b
     say("product", *map(float, product.position), *map(float, product.orientation))
     identity = product @ product.inverse()

@@ -14,7 +14,9 @@ def predict(mean, covariance, way, turn):
     """Moves the estimate by the odometry's way (m) and turn (rad)."""
     heading = mean[2] + turn / 2.0
     mean = mean + [way * math.cos(heading), way * math.sin(heading), turn]
-    by_state = np.array([[1, 0, -way * math.sin(heading)], [0, 1, way * math.cos(heading)], [0, 0, 1]])
+    by_state = np.array(
+        [[1, 0, -way * math.sin(heading)], [0, 1, way * math.cos(heading)], [0, 0, 1]]
+    )
     by_motion = np.array([[math.cos(heading), 0], [math.sin(heading), 0], [0, 1]])
     noise = np.diag([(0.05 * way) ** 2 + 1e-6, (0.1 * turn) ** 2 + (0.02 * way) ** 2 + 1e-6])
     return mean, by_state @ covariance @ by_state.T + by_motion @ noise @ by_motion.T
@@ -54,7 +56,9 @@ def localise(seconds=40.0, seed=1):
         world.cylinder(float(x), float(y), radius=RADIUS)
     errors, mean, covariance = [], np.zeros(3), np.diag([1e-4, 1e-4, 1e-4])
     settings = {"p3at/odometry.track_error": 0.05, "p3at/odometry.slip_noise": 0.01}
-    with ruedo.launch(world, lockstep=1, seed=seed, disable=["p3at/camera"], settings=settings) as sim:
+    with ruedo.launch(
+        world, lockstep=1, seed=seed, disable=["p3at/camera"], settings=settings
+    ) as sim:
         robot = sim.robot("p3at")
         seen = sim.step(20)
         last = seen.latest(robot.odometry)
@@ -65,7 +69,9 @@ def localise(seconds=40.0, seed=1):
             last = now
             for middle in pillars_in(scan.points(robot.lrf)[:, :2]):
                 mean, covariance = correct(mean, covariance, middle)
-            errors.append([math.dist(mean[:2], (pose.x, pose.y)), math.dist((now.x, now.y), (pose.x, pose.y))])
+            errors.append(
+                [math.dist(mean[:2], (pose.x, pose.y)), math.dist((now.x, now.y), (pose.x, pose.y))]
+            )
             seen = sim.step(20, [robot.velocity_command(0.35, 0.3)])
     return np.array(errors)
 

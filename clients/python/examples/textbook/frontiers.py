@@ -17,8 +17,8 @@ def mark(cells, chart, scan, robot, pose):
     ranges = np.where(np.isfinite(scan.ranges), scan.ranges, 8.0)
     for share in np.arange(0.0, 1.0, 0.01):
         along = share * np.maximum(ranges - CELL, 0.0)
-        x, y, _ = sensor.apply(np.stack([along * np.cos(scan.angles), along * np.sin(scan.angles)], 1)).T
-        row, column = np.floor((y + HALF) / CELL).astype(int), np.floor((x + HALF) / CELL).astype(int)
+        on_rays = np.stack([along * np.cos(scan.angles), along * np.sin(scan.angles)], axis=1)
+        column, row = np.floor((sensor.apply(on_rays)[:, :2].T + HALF) / CELL).astype(int)
         inside = (row >= 0) & (row < len(cells)) & (column >= 0) & (column < len(cells))
         cells[row[inside], column[inside]] = 0
     for x, y, _ in scan.points(robot.lrf, pose):
@@ -76,4 +76,4 @@ def explore(seconds=150.0):
 
 if __name__ == "__main__":
     chart, complete = explore()
-    print(chart, "complete" if complete else "not complete", f"{(chart.cells == 0).sum() * CELL**2:.0f} m^2")
+    print(chart, "complete" if complete else "not complete")

@@ -20,7 +20,9 @@ def towards(pose, goal, feed_forward):
 
 def follow(seconds=40.0):
     """The follower's distances from the leader (m), ten a second."""
-    world = ruedo.World().robot("p3at", 0, 0, name="leader").robot("p3at", -2.5, 0.8, name="follower")
+    world = (
+        ruedo.World().robot("p3at", 0, 0, name="leader").robot("p3at", -2.5, 0.8, name="follower")
+    )
     options = {"disable": ["leader/camera", "follower/camera"], "noise": False}
     gaps = []
     with ruedo.launch(world, lockstep=1, **options) as sim:

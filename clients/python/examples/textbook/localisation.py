@@ -68,8 +68,8 @@ def localise(seconds=20.0, count=4000, seed=1):
             particles = resampled(particles, chart, ranges, scan.angles[BEAMS], ahead, draw)
             errors.append(math.dist(particles[:, :2].mean(axis=0), (pose.x, pose.y)))
             last = now
-            blocked = scan.nearest(-0.7, 0.7) < 0.8
-            seen = sim.step(100, [robot.velocity_command(0.0, 0.8) if blocked else robot.velocity_command(0.3, 0.1)])
+            command = (0.0, 0.8) if scan.nearest(-0.7, 0.7) < 0.8 else (0.3, 0.1)
+            seen = sim.step(100, [robot.velocity_command(*command)])
     return errors
 
 

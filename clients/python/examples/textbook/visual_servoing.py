@@ -17,7 +17,11 @@ def beacon_in(picture):
 def servo(beacon=(4.0, 1.2), seconds=30.0):
     """Distance of the camera from the beacon (m) and its bearing (rad) at the end."""
     x, y = beacon
-    world = ruedo.World().robot("p3at").cylinder(x, y, radius=RADIUS, height=1.2, colour=(0.9, 0.05, 0.05))
+    world = (
+        ruedo.World()
+        .robot("p3at")
+        .cylinder(x, y, radius=RADIUS, height=1.2, colour=(0.9, 0.05, 0.05))
+    )
     with ruedo.launch(world, lockstep=1, noise=False) as sim:
         robot = sim.robot("p3at")
         seen, command = sim.step(20), (0.0, 0.4)

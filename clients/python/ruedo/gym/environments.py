@@ -139,7 +139,10 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self.render_mode = render_mode
         self._first = 0 if split == "train" else TEST_ROOMS
         self._options: Info = {
-            "settings": {**self.task.settings, **named("set", set, '{"robot/lrf.update_rate": 10}')},
+            "settings": {
+                **self.task.settings,
+                **named("set", set, '{"robot/lrf.update_rate": 10}'),
+            },
             "disable": [*self.task.disable, *texts("disable", disable)],
             "noise": noise,
             "randomize": randomize or {},
