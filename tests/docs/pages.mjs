@@ -26,7 +26,9 @@ for (const [screen, width, colorScheme] of [
     await page.goto(`file://${site}/${name}`, { waitUntil: "load" });
     const found = await page.evaluate(() => ({
       wider: document.documentElement.scrollWidth - document.documentElement.clientWidth,
-      broken: [...document.images].filter((one) => one.complete && !one.naturalWidth).map((one) => one.src),
+      broken: [...document.images]
+        .filter((one) => one.complete && !one.naturalWidth)
+        .map((one) => one.src),
     }));
     if (found.wider > 0) console.log(`${screen} ${name}: ${found.wider} pixels too wide`);
     for (const one of found.broken) console.log(`${screen} ${name}: ${one} does not load`);

@@ -121,13 +121,17 @@ def launch(
     server = _Server(
         [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
     )
+    page = f"http://127.0.0.1:{port}/" if port else None
+    return _joined(server, url, name, timeout, page)
+
+
+def _joined(server: _Server, url: str, name: str, timeout: float, page: str | None) -> Simulation:
+    """Ends the server where that fails. Raises LaunchError with what it said."""
+    until = time.monotonic() + timeout
     try:
-        until = time.monotonic() + timeout
         server.await_port(url, until)
-        left = max(until - time.monotonic(), 1.0)
-        page = f"http://127.0.0.1:{port}/" if port else None
-        return Simulation(url, name, left, server, view=page)
-    except NoServer as error:  # with what the server said, when it ended
+        return Simulation(url, name, max(until - time.monotonic(), 1.0), server, view=page)
+    except NoServer as error:
         server.end()
         raise LaunchError(str(error)) from None
     except BaseException:
