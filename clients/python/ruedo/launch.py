@@ -102,9 +102,9 @@ def launch(
     plugin: shared libraries with sensors or drives. wait_for: inputs that the run waits for where a
     command is due, "p3at/velocity@10". args: further options of `ruedo run`. url: None takes a
     local socket, which no other user of the machine reads, and plain LCM programs do not know;
-    "auto" a free port for LCM. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server
-    prints (else it is shown in the errors alone). view: the web console, which show() of the
-    simulation opens. Raises LaunchError with what the server said.
+    "auto" a free port for LCM. name: of this client. timeout: s of real time until the world is
+    loaded. verbose: show what the server prints (else it is shown in the errors alone). view: the
+    web console, which show() of the simulation opens. Raises LaunchError with what the server said.
     """
     timeout = arguments.number("timeout", timeout)
     name = arguments.client_name(name)

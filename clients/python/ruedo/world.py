@@ -194,7 +194,10 @@ class World:
         )
 
     def person(self, path: Way, *, name: str = "person") -> World:
-        """A person who walks along a path, again and again; path: (s, x, y) or (s, x, y, heading)."""
+        """A person who walks along a path, again and again.
+
+        path: (s, x, y) or (s, x, y, heading).
+        """
         points = "".join(
             f"<waypoint><time>{point[0]!r}</time><pose>{point[1]!r} {point[2]!r} 0 0 0 {point[3]!r}</pose></waypoint>"
             for point in _points(path)
@@ -278,7 +281,7 @@ def _points(path: Way) -> list[tuple[float, float, float, float]]:
     for point in path:
         if not isinstance(point, (tuple, list)) or len(point) not in (3, 4):
             raise ValueError(
-                f"path: {arguments.shown(point)} is no (s, x, y) and no (s, x, y, heading)"
+                f"path: {arguments.shown(point)} needs (s, x, y) or (s, x, y, heading)"
             )
         numbers = [_finite("path", one) for one in point]
         made.append((numbers[0], numbers[1], numbers[2], numbers[3] if len(numbers) > 3 else 0.0))
