@@ -22,9 +22,10 @@ def changelog(text: str, maintainer: str, date: str) -> str:
         r"^## (\S+?),? .*?\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL
     ).groups()
     changes = [" ".join(item.split()) for item in re.split(r"^- ", items, flags=re.MULTILINE)[1:]]
+    plain = [re.sub(r"[`*]|\[([^]]*)\]\([^)]*\)", r"\1", change) for change in changes]
     lines = [
-        textwrap.fill(change.replace("`", ""), 78, initial_indent="  * ", subsequent_indent="    ")
-        for change in changes
+        textwrap.fill(change, 78, initial_indent="  * ", subsequent_indent="    ")
+        for change in plain
     ]
     body = "\n".join(lines)
     return f"ruedo ({version}) unstable; urgency=medium\n\n{body}\n\n -- {maintainer}  {date}\n"
