@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import re
 import signal
 import subprocess
@@ -12,69 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_packages_with_prefixes
-from server import PATIENCE, RUEDO, SOURCE, Run, wait_for
-
-PACKAGES = set(get_packages_with_prefixes())
-MIDDLEWARES = [m for m in ("rmw_fastrtps_cpp", "rmw_cyclonedds_cpp") if m in PACKAGES]
-
-
-def needs(*packages):
-    missing = sorted(set(packages) - PACKAGES)
-    return pytest.mark.skipif(bool(missing), reason=f"the workspace lacks {' '.join(missing)}")
-
-
-class Ros:
-    """`ros2`, beside a run."""
-
-    def __init__(self, run, middleware):
-        self.run = run
-        self.environment = {
-            **os.environ,
-            "RMW_IMPLEMENTATION": middleware,
-            "ROS_DOMAIN_ID": str(run.domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONUNBUFFERED": "1",
-            "RUEDO": RUEDO,
-        }
-
-    def _done(self, words):
-        return subprocess.run(
-            ["ros2", *map(str, words)],
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
-
-    def __call__(self, *words):
-        """What it prints."""
-        done = self._done(words)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
-
-    def finds(self, text, *words):
-        """Waits until its output has that text: it looks for nodes for some seconds only."""
-        words = [*words, "--no-daemon", "--spin-time", "3"]
-        wait_for(lambda: text in self._done(words).stdout, text)
-
-    def until(self, pattern, *words):
-        """The first match in the output of a command that goes on, which is then ended."""
-        with subprocess.Popen(
-            ["ros2", *words],
-            env=self.environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        ) as process:
-            lines = []
-            for line in process.stdout:
-                lines.append(line)
-                if found := re.search(pattern, line):
-                    process.send_signal(signal.SIGINT)
-                    process.stdout.read()
-                    return found
-        pytest.fail("".join(lines))
+from ros import MIDDLEWARES, Ros, needs
+from server import PATIENCE, RUEDO, SOURCE, Run
 
 
 @pytest.fixture(params=MIDDLEWARES)
@@ -166,10 +103,15 @@ def test_the_action(ros):
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_bags(ros, tmp_path, storage):
     words = ["bag", "record", "-s", storage, "-o", str(tmp_path / "bag"), "/scan", "/odom", "/tf"]
-    with subprocess.Popen(["ros2", *words], env=ros.environment) as recording:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            recording.wait(10)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(["ros2", *words], env=ros.environment, **pipes) as recording:
+        for line in recording.stdout:
+            if "Subscribed to topic '/scan'" in line:
+                break
+        # Another reader's message is one that the recorder has, too.
+        ros("topic", "echo", "--once", "/scan", "sensor_msgs/msg/LaserScan")
         recording.send_signal(signal.SIGINT)
+        recording.stdout.read()
     told = ros("bag", "info", tmp_path / "bag")
     assert re.search(r"Topic: /scan \| Type: sensor_msgs/msg/LaserScan \| Count: [1-9]", told)
 
