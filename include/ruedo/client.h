@@ -915,7 +915,11 @@ class [[nodiscard]] Simulation : public Requests {
   /// (LaunchOptions::snapshots).
   /// @param name of the snapshot
   /// @return what restore() takes
-  [[nodiscard]] State save(const std::string& name = "saved") const { return snapshot(name); }
+  [[nodiscard]] State save(const std::string& name = "saved") const {
+    State saved = snapshot(name);
+    saved.name = name;
+    return saved;
+  }
   /// @copydoc Requests::restore
   State restore(const std::string& name) const;
   /// The same with what save() returned.

@@ -322,3 +322,23 @@ def test_the_jars_messages_are_lcms_too(tmp_path):
             ["java", "-cp", path, "Both"], capture_output=True, text=True, timeout=PATIENCE
         )
         assert done.stdout == "42\n", done.stderr
+
+
+def test_a_plain_lcm_program_reaches_a_launched_run():
+    import lcm
+    import ruedo
+
+    with ruedo.launch(HALL, url="auto", noise=False, disable=["p3at/camera"]) as sim:
+        bus, seen = lcm.LCM(sim.url), []
+        bus.subscribe("p3at/pose", lambda _, data: seen.append(ruedo.lcmtypes.pose_t.decode(data)))
+        while len(seen) < 3:
+            bus.handle_timeout(1000)
+        assert seen[0].pos[2] == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_state_is_saved_and_restored_as_an_engine_does(language, tmp_path):
+    with ruedo_run(
+        "--paused", "--disable", "p3at/camera", "--snapshots", str(tmp_path), world=HALL
+    ) as server:
+        said = api(language, server.url, "saves")
+    assert said.words("back") == ["0", "0"]

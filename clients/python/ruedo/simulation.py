@@ -331,7 +331,7 @@ class Simulation(Requests):
         """Keeps the state under a name, in the folder that the server was started with
         (``launch(..., snapshots=folder)``); restore() takes what it returns, as an Engine's does.
         """
-        return self.snapshot(name)
+        return replace(self.snapshot(name), name=name)
 
     def restore(self, name: str | State) -> State:
         state = super().restore(name.name if isinstance(name, State) else name)

@@ -10,6 +10,7 @@ import ruedo.Ruedo;
 import ruedo.RuedoException;
 import ruedo.Scan;
 import ruedo.Simulation;
+import ruedo.State;
 import ruedo.Synchronised;
 import ruedo.Transform;
 import ruedo.lcmtypes.velocity_command_t;
@@ -207,6 +208,13 @@ public final class Api {
         say("published", fastest); // it lapsed: nobody repeats it
     }
 
+    private static void saves(Simulation sim) {
+        long begin = sim.state().step;
+        State saved = sim.save("here");
+        sim.step(40);
+        say("back", sim.restore(saved).step - begin, sim.state().step - begin);
+    }
+
     private static void fixes(Simulation sim) {
         NavSat first = sim.robot("here").gps().latest(PATIENCE);
         double[] enu = sim.robot("there").gps().latest(PATIENCE).enu(first);
@@ -232,6 +240,9 @@ public final class Api {
                     break;
                 case "driving":
                     driving(sim);
+                    break;
+                case "saves":
+                    saves(sim);
                     break;
                 case "fixes":
                     fixes(sim);

@@ -187,6 +187,14 @@ void driving(const rc::Simulation& sim) {
   say("published", fastest);  // it lapsed: nobody repeats it
 }
 
+void saves(const rc::Simulation& sim) {
+  const int64_t begin = sim.state().step;
+  const rc::State saved = sim.save("here");
+  (void)sim.step(40);
+  const rc::State back = sim.restore(saved);
+  say("back", back.step - begin, sim.state().step - begin);
+}
+
 void fixes(const rc::Simulation& sim) {
   const rc::NavSat first = sim.robot("here").gps().latest(kPatience);
   const rc::Vector3 enu = sim.robot("there").gps().latest(kPatience).enu(first);
@@ -206,6 +214,7 @@ int main(int argc, char** argv) {
       {"bodies", [&] { bodies(sim); }},
       {"geometry", [&] { geometry(sim); }},
       {"driving", [&] { driving(sim); }},
+      {"saves", [&] { saves(sim); }},
       {"fixes", [&] { fixes(sim); }},
       {"joints_in_lockstep", [&] { joints_in_lockstep(sim); }},
   };

@@ -139,6 +139,13 @@ def driving(sim):
     say("published", fastest)  # it lapsed: nobody repeats it
 
 
+def saves(sim):
+    begin = sim.state().step
+    saved = sim.save("here")
+    sim.step(40)
+    say("back", sim.restore(saved).step - begin, sim.state().step - begin)
+
+
 def fixes(sim):
     first, second = (sim.robot(name).gps.latest(PATIENCE) for name in ("here", "there"))
     say("enu", *map(float, second.enu(first)))

@@ -462,7 +462,18 @@ public final class Simulation extends Requests implements AutoCloseable {
      * LaunchOptions#snapshots}); restore() takes what it returns.
      */
     public State save(String name) {
-        return snapshot(name);
+        State now = snapshot(name);
+        return new State(
+                now.utime,
+                now.step,
+                now.stateHash,
+                now.paused,
+                now.rate,
+                name,
+                now.position,
+                now.orientation,
+                now.linear,
+                now.angular);
     }
 
     /** Puts the world back to what save() returned. */
