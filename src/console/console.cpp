@@ -126,6 +126,7 @@ http::HttpResponse Console::Impl::get(std::string_view path) {
     if (!types) types = http::bytes_of(types_json());
     return blob(types, "application/json");
   }
+  if (path == "/header") return blob(stage.source->log_header(), "application/octet-stream");
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);

@@ -17,6 +17,7 @@ struct LiveHost {
   std::function<std::string(const std::string& name)> model_text;
   std::function<void(const std::string& channel, std::span<const uint8_t> message)> on_message;
   std::function<uint64_t()> lost;  // messages that the bus could not send
+  std::function<std::vector<uint8_t>()> log_header;  // null: none
   std::string save_name;           // of the file written by SAVE
 };
 
@@ -67,6 +68,10 @@ class LiveSource : public Source {
     return scene == 0 ? host_.world() : nullptr;
   }
   std::string model_text(const std::string& name) override { return host_.model_text(name); }
+  http::Bytes log_header() override {
+    if (!host_.log_header) return nullptr;
+    return std::make_shared<const std::vector<uint8_t>>(host_.log_header());
+  }
   std::string save_name() const override { return host_.save_name; }
   std::string info_channel() const override { return info_channel_; }
   const Events* events() const override { return &events_; }

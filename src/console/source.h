@@ -76,6 +76,8 @@ class Source {
     static_cast<void>(name);
     return {};
   }
+  // log_header_t of a running server, for logs that a page records; null if there is none.
+  virtual http::Bytes log_header() { return nullptr; }
   // The file written by SAVE; "" for none.
   virtual std::string save_name() const { return {}; }
 

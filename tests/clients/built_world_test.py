@@ -37,7 +37,7 @@ def test_paths_people_doors_and_sensors(tmp_path):
 def test_what_is_wrong_is_said():
     with pytest.raises(ValueError, match="at least two points"):
         ruedo.World().box(0, 0, path=[(0, 0, 0)])
-    with pytest.raises(ValueError, match=r"no \(s, x, y\)"):
+    with pytest.raises(ValueError, match=r"needs \(s, x, y\)"):
         ruedo.World().person([(0, 0), (1, 1)])
     with pytest.raises(ValueError, match="no mass"):
         ruedo.World().box(0, 0, mass=1.0, path=[(0, 0, 0), (1, 1, 1)])

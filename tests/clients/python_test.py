@@ -300,7 +300,7 @@ def test_a_closed_simulation_leaves_nothing_open(options):
                 sim.step(20) if sim.lockstep else sim.state()
             del sim
             with pytest.raises(ruedo.LaunchError, match="--set p3at/lrf.x"):
-                ruedo.launch(HALL, set={"p3at/lrf.x": 1}, **options, **QUICK)
+                ruedo.launch(HALL, settings={"p3at/lrf.x": 1}, **options, **QUICK)
             gc.collect()
         finally:
             sys.unraisablehook = before

@@ -116,6 +116,7 @@ REFUSALS = {
     ("SET_TWIST", "BAD_REQUEST"): {"name": "p3at", **STILL, "linear": [math.inf, 0.0, 0.0]},
     ("SET_TWIST", "UNKNOWN_NAME"): {"name": "nobody", **STILL},
     ("GET_STATE", "UNKNOWN_NAME"): {"name": "nobody"},
+    ("GET_JOINT_LIMITS", "UNKNOWN_NAME"): {"name": "nobody"},
     ("RESET_ODOMETRY", "UNKNOWN_NAME"): {"name": "nobody"},
     ("RESTORE", "UNKNOWN_NAME"): {"name": "nothing"},
     ("RESTORE", "REFUSED"): {"name": "damaged"},

@@ -85,9 +85,11 @@ types = {
     if hasattr(type, "_get_packed_fingerprint")
 }
 names = {}
-for name in ruedo.__all__:
+classes = {name for name, one in vars(ruedo).items() if inspect.isclass(one)}  # deprecated, too
+for name in {*ruedo.__all__, *classes}:
     one = getattr(ruedo, name)
     members = list(inspect.signature(one).parameters) if inspect.isfunction(one) else dir(one)
+    members += getattr(one, 'deprecated_options', ())
     names[name] = [m for m in members if not m.startswith("_")] if name != "lcmtypes" else []
     fields = getattr(one, "__dataclass_fields__", None)
     names[name] += list(fields) if fields else []

@@ -396,6 +396,33 @@ def test_what_goes_wrong_is_said(tmp_path):
         browse(process.url, tmp_path, "odd")
 
 
+def test_a_page_records_a_log(tmp_path):
+    """Its messages are those of the run's own log, and it is shown like any other."""
+    whole, log = tmp_path / "whole.lcm", tmp_path / "page.lcm"
+    with running("--disable", "p3at/camera", "--record", whole) as process:
+        browse(process.url, tmp_path, "record", {"file": str(log)})
+    of_run = {(channel, data) for channel, _, data in events(whole)}
+    found = events(log)
+    assert found[0][0] == "ruedo/header"
+    times = [time_us for _, time_us, _ in found]
+    assert times == sorted(times)
+    samples = [(channel, data) for channel, _, data in found if "velocity" not in channel]
+    assert [channel for channel, data in samples if (channel, data) not in of_run] == []
+    assert {"ruedo/world", "p3at/pose", "p3at/odometry", "p3at/lrf"} <= {each[0] for each in samples}
+    assert any(channel == "p3at/velocity" for channel, _, _ in found), "commands, too"
+    there = list(states(log, 0))
+    assert there[-1][2] > there[0][2] + 0.2
+    moments = [there[round(share * (len(there) - 1))] for share in (0.9, 0.2, 0.6, 0.1, 1.0)]
+    given = {
+        "moments": [
+            {"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n}
+            for t, sim, x, y, n in moments
+        ]
+    }
+    with playing(log) as process:
+        browse(process.url, tmp_path, "log", given)
+
+
 def test_panels_do_more(tmp_path):
     with running() as process:
         seen = browse(process.url, tmp_path, "panels")

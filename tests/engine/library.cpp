@@ -56,7 +56,7 @@ void look(const std::string& world) {
   expect_error<std::invalid_argument>([&] { (void)ranges.begin<double>(); },
                                       "of type float, not double");
   expect_error<std::out_of_range>([&] { (void)ranges.begin<float>(2); }, "there are 2");
-  expect_error<ruedo::InputError>([&] { (void)engine.observe("ranges"); }, "no DEVICE.FIELD");
+  expect_error<ruedo::InputError>([&] { (void)engine.observe("ranges"); }, "not a DEVICE.FIELD");
   expect_error<std::invalid_argument>([&] { engine.step(0); }, "1 or more");
   expect_error<std::invalid_argument>([&] { engine.step(1, {0.1, 0.0}); }, "take 6");
   expect_error<std::out_of_range>([&] { engine.reset(2, 1); }, "there are 2");

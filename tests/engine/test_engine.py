@@ -240,7 +240,7 @@ class Wrong:
             ValueError,
             "do not fit (worlds, robots, 2) = (2, 1, 2)",
         ),
-        (lambda e: e.observe("ranges"), ValueError, "no DEVICE.FIELD"),
+        (lambda e: e.observe("ranges"), ValueError, "not a DEVICE.FIELD"),
         (
             lambda e: e.observe("lrf.rangs"),
             ValueError,

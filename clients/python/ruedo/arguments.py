@@ -172,6 +172,7 @@ def options(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
                 named[now] = named.pop(old)
             return call(*given, **named)
 
+        checked.deprecated_options = tuple(renamed)  # type: ignore[attr-defined]
         return checked
 
     return made

@@ -17,13 +17,27 @@
 #include "console/log_page.h"
 #include "console/log_source.h"
 #include "console/tap.h"
+#include "engine/outcome.h"
 #include "http/web_server.h"
+#include "log/header.h"
 #include "ruedo/world_info_t.hpp"
 #include "run/run.h"
 #include "system/to_stderr.h"
 
 namespace ruedo::cli {
 namespace {
+
+// For logs that a page records. From another machine nobody learns where files lie.
+std::vector<uint8_t> log_header(run::Run& run, uint64_t seed,
+                                const std::vector<std::string>& options, bool with_folders) {
+  log_header_t header = log::make_log_header(*run.world(), seed, options);
+  const auto cut = [](std::string& path) { path = std::filesystem::path(path).filename().string(); };
+  if (!with_folders) {
+    cut(header.world_file);
+    for (log_file_t& file : header.files) cut(file.path);
+  }
+  return engine::encoded(header);
+}
 
 void print_urls(const console::Console& serving) {
   for (const std::string& url : serving.urls()) fmt::print("View it at {}\n", url);
@@ -35,11 +49,13 @@ void print_urls(const console::Console& serving) {
 struct RunView::Impl {
   http::Address address;
   console::Tap tap;
+  uint64_t seed = 0;  // of the run, and what else its log header says
+  std::vector<std::string> result_options;
 };
 
 RunView::RunView(bool viewed, const std::string& address) {
   if (!viewed) return;
-  impl_.reset(new Impl{http::parse_address(address), {}});
+  impl_.reset(new Impl{http::parse_address(address), {}, 0, {}});
   http::check_port(impl_->address, "--view");
 }
 
@@ -47,6 +63,8 @@ RunView::~RunView() = default;
 
 void RunView::follow(run::RunOptions& options) {
   if (!impl_) return;
+  impl_->seed = options.simulation.fleet.seed;
+  impl_->result_options = options.result_options;
   options.hearer = [&tap = impl_->tap](const std::string& channel, const uint8_t* data,
                                        size_t size) { tap.hear(channel, data, size); };
 }
@@ -68,6 +86,11 @@ std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
             run.on_message(channel, message.data(), message.size());
           },
       .lost = [&run] { return run.lost(); },
+      .log_header =
+          [&run, seed = impl_->seed, options = impl_->result_options,
+           with_folders = impl_->address.loopback()] {
+            return log_header(run, seed, options, with_folders);
+          },
       .save_name = save.empty() ? "" : std::filesystem::path(save).filename().string()};
   auto source = std::make_unique<console::LiveSource>(tap, std::move(host), info);
   auto serving =

@@ -8,6 +8,7 @@ import { FaultForm } from "../ui/fault_form";
 import { FieldPlots } from "../ui/field_plots";
 import { FrameTree } from "../ui/frames";
 import { Inset } from "../ui/inset";
+import { LogRecorder } from "../ui/log_recorder";
 import { Notes } from "../ui/notes";
 import { Publisher } from "../ui/publish";
 import { RobotPages } from "../ui/robot";
@@ -25,6 +26,7 @@ export class PanelView {
   readonly editPage: EditPage;
   readonly inset: Inset;
   readonly all: Record<Tab, HTMLElement>; // the pages
+  readonly log: LogRecorder;
   readonly linkButton = h("button", { id: "link" }, "Copy link");
   private readonly frames: FrameTree;
 
@@ -59,10 +61,11 @@ export class PanelView {
       seek,
       plot: (channel, field) => this.plots.plot(channel, field, field === "distance"),
     });
+    this.log = new LogRecorder(page, want);
     this.pages.extras.append(this.inset.chooser, this.frames.element, this.faults(model));
     this.editPage.extras.append(
       new Capture(page, scene.stage, scene.canvas).element,
-      h("div", { class: "row" }, this.linkButton),
+      h("div", { class: "row" }, this.log.button, this.linkButton),
     );
     const choice = () => new RobotChoice(page, (robot) => chooseRobot(page, robot)).element;
     this.all = {
@@ -96,6 +99,7 @@ export class PanelView {
     model.wanted.add(() => [
       ...channels.opened,
       ...plots.channels,
+      ...this.log.channels,
       ...(inset.channel ? [inset.channel] : []),
     ]);
     plots.takeDrops(byId("dock"));
@@ -103,9 +107,16 @@ export class PanelView {
       plots.plot(channel, path, false);
       page.set({ tab: "Plots" });
     };
-    if (model.rewind) model.rewind.onKept = (channel, bytes) => plots.message(channel, bytes);
+    if (model.rewind)
+      model.rewind.onKept = (channel, bytes, time_s) => {
+        plots.message(channel, bytes);
+        this.log.message(channel, bytes, time_s);
+      };
     model.onForget((reset) => {
-      if (reset) plots.clear();
+      if (reset) {
+        plots.clear();
+        this.log.reset();
+      }
       pages.forget();
     });
     page.watch(["theme"], () => {

@@ -85,7 +85,8 @@ export class Rewind implements RunLink {
   private last_ms = 0;
   onPast: (past: Past | null, range: { begin: number; end: number }) => void = () => undefined;
 
-  onKept: (channel: string, bytes: Uint8Array) => void = () => undefined;
+  // time: s, sim time
+  onKept: (channel: string, bytes: Uint8Array, time: number) => void = () => undefined;
 
   constructor(private readonly inner: RunLink) {
     setInterval(() => this.tick(), kTick_ms);
@@ -184,8 +185,7 @@ export class Rewind implements RunLink {
     if (!type || kNow.has(type) || !this.isLive) return this.handler.message(channel, bytes);
     if (type === "world_state_t" || type === "tick_t") this.heed(type, bytes);
     if (type === "world_state_t") this.states = channel;
-    this.keep(channel, type, bytes);
-    this.onKept(channel, bytes);
+    this.onKept(channel, bytes, this.keep(channel, type, bytes));
     if (!this.past) this.handler.message(channel, bytes);
   }
 
@@ -200,7 +200,8 @@ export class Rewind implements RunLink {
     this.clear();
   }
 
-  private keep(channel: string, type: string, bytes: Uint8Array): void {
+  // Returns the message's sim time, s.
+  private keep(channel: string, type: string, bytes: Uint8Array): number {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
       drawn = type === "markers_t", // stamped by the client's own clock
       hasTime = !drawn && kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
@@ -217,7 +218,8 @@ export class Rewind implements RunLink {
     this.bytes += bytes.length;
     if (drawn) {
       this.draw(channel, time, withLayer(this.drawn?.messages ?? [], copy), bytes.length);
-      return this.forget();
+      this.forget();
+      return time;
     }
     if (later && last) last.messages.push(copy);
     else if (last && last.time >= time)
@@ -228,6 +230,7 @@ export class Rewind implements RunLink {
     }
     this.order.at(-1)!.size += bytes.length;
     this.forget();
+    return time;
   }
 
   private draw(channel: string, time: number, messages: Uint8Array[], size = 0): void {
