@@ -408,7 +408,9 @@ def test_a_page_records_a_log(tmp_path):
     assert times == sorted(times)
     samples = [(channel, data) for channel, _, data in found if "velocity" not in channel]
     assert [channel for channel, data in samples if (channel, data) not in of_run] == []
-    assert {"ruedo/world", "p3at/pose", "p3at/odometry", "p3at/lrf"} <= {each[0] for each in samples}
+    assert {"ruedo/world", "p3at/pose", "p3at/odometry", "p3at/lrf"} <= {
+        each[0] for each in samples
+    }
     assert any(channel == "p3at/velocity" for channel, _, _ in found), "commands, too"
     there = list(states(log, 0))
     assert there[-1][2] > there[0][2] + 0.2

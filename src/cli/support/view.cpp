@@ -31,7 +31,9 @@ namespace {
 std::vector<uint8_t> log_header(run::Run& run, uint64_t seed,
                                 const std::vector<std::string>& options, bool with_folders) {
   log_header_t header = log::make_log_header(*run.world(), seed, options);
-  const auto cut = [](std::string& path) { path = std::filesystem::path(path).filename().string(); };
+  const auto cut = [](std::string& path) {
+    path = std::filesystem::path(path).filename().string();
+  };
   if (!with_folders) {
     cut(header.world_file);
     for (log_file_t& file : header.files) cut(file.path);
