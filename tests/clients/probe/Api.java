@@ -122,6 +122,8 @@ public final class Api {
         for (Scan scan : robot.lrf()) {
             if (scan.ranges.length > 0 && ++count == 3) break;
         }
+        if (robot.lrf().samples().limit(2).mapToLong(scan -> scan.utime).distinct().count() != 2)
+            throw new IllegalStateException("samples() gave one twice");
         List<Double> times = new ArrayList<>();
         for (double t : sim.every(0.25)) {
             times.add(t);

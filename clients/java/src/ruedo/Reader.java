@@ -1,6 +1,7 @@
 package ruedo;
 
 import java.util.Iterator;
+import java.util.stream.StreamSupport;
 
 /**
  * Reads a stream at a pace of its own, which other readers of the stream do not change. Thread
@@ -50,6 +51,11 @@ public class Reader<T extends Sample> implements Iterable<T> {
     @Override
     public Iterator<T> iterator() {
         return new UntilRunEnds<>(() -> next(Double.POSITIVE_INFINITY));
+    }
+
+    /** The same as a stream of Java's: robot.lrf().samples().limit(10).forEach(...). */
+    public java.util.stream.Stream<T> samples() {
+        return StreamSupport.stream(spliterator(), false);
     }
 
     /**
