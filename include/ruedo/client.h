@@ -28,6 +28,7 @@
 #include <tuple>
 #include <vector>
 
+#include "ruedo/client_map.h"
 #include "ruedo/client_markers.h"
 #include "ruedo/client_requests.h"
 #include "ruedo/client_samples.h"

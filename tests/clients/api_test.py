@@ -342,3 +342,27 @@ def test_a_state_is_saved_and_restored_as_an_engine_does(language, tmp_path):
     ) as server:
         said = api(language, server.url, "saves")
     assert said.words("back") == ["0", "0"]
+
+
+def test_maps_give_the_same_in_each_language(language):
+    """Rays by the geometry of the room, distances by SciPy's."""
+    import numpy as np
+    from scipy.ndimage import distance_transform_edt
+
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        said = api(language, server.url, "chart")
+    assert said.words("at") == ["0", "100", "-1"]
+    *rays, short = said.numbers("rays")
+    assert short == math.inf
+    to_pillar = math.atan2(1.8, 1.55)
+    for i, ray in enumerate(rays):
+        cosine, sine = math.cos(0.1 * i), math.sin(0.1 * i)
+        across = (4.4 if cosine > 0 else 3.4) / abs(cosine)
+        along = (3.65 if sine > 0 else 2.15) / abs(sine) if sine else math.inf
+        if abs(0.1 * i - to_pillar) > 0.06:
+            assert ray == pytest.approx(min(across, along), abs=2e-6)
+    cells = np.zeros((60, 80))
+    cells[[0, -1], :] = cells[:, [0, -1]] = cells[40, 50] = 100
+    expected = distance_transform_edt(cells != 100)[::7, ::9] * 0.1
+    assert said.numbers("field") == pytest.approx(expected.ravel().tolist(), abs=1e-6)
+    assert said.words("grown") == ["True", "False"]

@@ -4,6 +4,7 @@ import ruedo.JointMode;
 import ruedo.Joints;
 import ruedo.NavSat;
 import ruedo.Observations;
+import ruedo.OccupancyMap;
 import ruedo.Pose;
 import ruedo.Robot;
 import ruedo.Ruedo;
@@ -217,6 +218,30 @@ public final class Api {
         say("back", sim.restore(saved).step - begin, sim.state().step - begin);
     }
 
+    /** 8 x 6 m with walls of a cell, about the origin, and a pillar of a cell. */
+    private static void chart() {
+        byte[][] cells = new byte[60][80];
+        for (int row = 0; row < 60; ++row) {
+            for (int column = 0; column < 80; ++column) {
+                boolean wall = row == 0 || row == 59 || column == 0 || column == 79;
+                if (wall || row == 40 && column == 50) cells[row][column] = 100;
+            }
+        }
+        OccupancyMap map = new OccupancyMap(cells, 0.1, -4.0, -3.0, 0.0);
+        say("at", map.at(0.0, 0.0), map.at(1.05, 1.05), map.at(9.0, 0.0));
+        List<Object> line = new ArrayList<>(List.of("rays"));
+        for (int i = 0; i < 63; ++i) line.add(map.ray(-0.5, -0.75, 0.1 * i, 30.0));
+        line.add(map.ray(0.0, 0.0, 0.0, 1.0));
+        say(line.toArray());
+        double[][] field = map.distanceField();
+        line = new ArrayList<>(List.of("field"));
+        for (int row = 0; row < 60; row += 7)
+            for (int column = 0; column < 80; column += 9) line.add(field[row][column]);
+        say(line.toArray());
+        OccupancyMap grown = map.inflated(0.25);
+        say("grown", grown.occupied(1.05, 1.25), grown.occupied(1.05, 1.35));
+    }
+
     private static void fixes(Simulation sim) {
         NavSat first = sim.robot("here").gps().latest(PATIENCE);
         double[] enu = sim.robot("there").gps().latest(PATIENCE).enu(first);
@@ -242,6 +267,9 @@ public final class Api {
                     break;
                 case "driving":
                     driving(sim);
+                    break;
+                case "chart":
+                    chart();
                     break;
                 case "saves":
                     saves(sim);

@@ -195,6 +195,32 @@ void saves(const rc::Simulation& sim) {
   say("back", back.step - begin, sim.state().step - begin);
 }
 
+// 8 x 6 m with walls of a cell, about the origin, and a pillar of a cell.
+void chart() {
+  constexpr size_t kRows = 60, kColumns = 80;
+  std::vector<int8_t> cells(kRows * kColumns, 0);
+  for (size_t row = 0; row < kRows; ++row) {
+    for (size_t column = 0; column < kColumns; ++column) {
+      const bool wall = row == 0 || row + 1 == kRows || column == 0 || column + 1 == kColumns;
+      if (wall || (row == 40 && column == 50)) cells[row * kColumns + column] = 100;
+    }
+  }
+  const rc::Map map(cells, kColumns, 0.1, {-4.0, -3.0, 0.0});
+  say("at", map.at(0.0, 0.0), map.at(1.05, 1.05), map.at(9.0, 0.0));
+  std::string line = "rays";
+  for (int i = 0; i < 63; ++i) line += " " + word(map.ray(-0.5, -0.75, 0.1 * i));
+  say(line, map.ray(0.0, 0.0, 0.0, 1.0));
+  const std::vector<double> field = map.distance_field();
+  line = "field";
+  for (size_t row = 0; row < kRows; row += 7) {
+    for (size_t column = 0; column < kColumns; column += 9)
+      line += " " + word(field[row * kColumns + column]);
+  }
+  say(line);
+  const rc::Map grown = map.inflated(0.25);
+  say("grown", grown.occupied(1.05, 1.25), grown.occupied(1.05, 1.35));
+}
+
 void fixes(const rc::Simulation& sim) {
   const rc::NavSat first = sim.robot("here").gps().latest(kPatience);
   const rc::Vector3 enu = sim.robot("there").gps().latest(kPatience).enu(first);
@@ -214,6 +240,7 @@ int main(int argc, char** argv) {
       {"bodies", [&] { bodies(sim); }},
       {"geometry", [&] { geometry(sim); }},
       {"driving", [&] { driving(sim); }},
+      {"chart", [&] { chart(); }},
       {"saves", [&] { saves(sim); }},
       {"fixes", [&] { fixes(sim); }},
       {"joints_in_lockstep", [&] { joints_in_lockstep(sim); }},

@@ -4,6 +4,7 @@ same commands and output."""
 import itertools
 import sys
 
+import numpy as np
 import ruedo
 
 PATIENCE = 300.0  # s, for what comes sooner or later
@@ -144,6 +145,21 @@ def saves(sim):
     saved = sim.save("here")
     sim.step(40)
     say("back", sim.restore(saved).step - begin, sim.state().step - begin)
+
+
+def chart(_):
+    """8 x 6 m with walls of a cell, about the origin, and a pillar of a cell."""
+    cells = [[0] * 80 for _ in range(60)]
+    for row in range(60):
+        for column in range(80):
+            if row in (0, 59) or column in (0, 79) or (row, column) == (40, 50):
+                cells[row][column] = 100
+    map = ruedo.Map(np.array(cells, np.int8), 0.1, (-4.0, -3.0, 0.0))
+    say("at", map.at(0.0, 0.0), map.at(1.05, 1.05), map.at(9.0, 0.0))
+    say("rays", *(map.ray(-0.5, -0.75, 0.1 * i) for i in range(63)), map.ray(0.0, 0.0, 0.0, 1.0))
+    say("field", *map.distance_field()[::7, ::9].ravel().tolist())
+    grown = map.inflated(0.25)
+    say("grown", grown.occupied(1.05, 1.25), grown.occupied(1.05, 1.35))
 
 
 def fixes(sim):
