@@ -100,7 +100,7 @@ def on_page_markdown(markdown, page, config, files):
 
 
 def others():
-    """(the folder in the site, its pages) of Doxygen and javadoc; pages are None without a build."""
+    """(folder in the site, pages) of Doxygen and javadoc; None where no build made them."""
     for variable, folder in (("RUEDO_CPP_PAGES", "api/cpp"), ("RUEDO_JAVA_PAGES", "api/java")):
         pages = Path(os.environ.get(variable, ""))
         yield folder, pages if (pages / "index.html").is_file() else None

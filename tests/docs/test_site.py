@@ -16,6 +16,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "console"))
 from harness import CHROMIUM, NODE, needs_browser
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts/site"))
+from wrap import wrap
+
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 # Pages whose tables and texts scripts write from measurements or from proto/.
@@ -156,6 +159,15 @@ def test_prose_is_short():
     longest = sorted(sizes.items(), key=lambda item: -item[1])[:8]
     print(f"prose: {sum(sizes.values())} bytes of {len(sizes)} pages; longest: {longest}")
     assert sum(sizes.values()) <= MOST_BYTES, longest
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.name != "architecture.md"], ids=lambda p: p.name
+)
+def test_prose_is_wrapped(page):
+    """scripts/site/wrap.py FILE wraps it; scripts write architecture.md."""
+    text = page.read_text(encoding="utf-8")
+    assert wrap(text) == text
 
 
 def test_prose_is_what_is_left_of_a_page():
