@@ -18,6 +18,12 @@ ARENA = str(SOURCE / "worlds/arena.sdf")
 # Fast DDS of two network namespaces meets in shared memory: tests that run at once need domains of
 # their own.
 _domains = itertools.count(int(os.environ.get("RUEDO_FIRST_DOMAIN", "1")))
+
+
+def new_domain() -> int:
+    return next(_domains)
+
+
 _OF_ROS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH")  # Ruedo needs no ROS
 
 
@@ -32,7 +38,7 @@ class Run:
         lcm: str = "auto",
         domain: int | None = None,
     ):
-        self.domain = next(_domains) if domain is None else domain
+        self.domain = new_domain() if domain is None else domain
         environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), **(environment or {})}
         self.process = subprocess.Popen(
             [RUEDO, "run", world, "--ros2", "--lcm", lcm, *arguments],
