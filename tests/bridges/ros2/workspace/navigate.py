@@ -2,7 +2,7 @@
 
 navigate.py NAMESPACE '[[X, Y], ...]'    (m, in map; prints one JSON line)
 
-Nav2's initial guess is the robot's true pose at the start, where `--slam` is not given.
+Nav2's initial guess is the robot's true pose at the start.
 """
 
 import argparse
@@ -21,7 +21,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("namespace")
     parser.add_argument("goals", type=json.loads)
-    parser.add_argument("--slam", action="store_true")
     options = parser.parse_args()
     rclpy.init()
     navigator = BasicNavigator(namespace=options.namespace)
@@ -44,13 +43,8 @@ def main() -> None:
         place.pose = pose
         return place
 
-    # The frame of slam_toolbox's map is the robot's pose at the start.
-    start = true_pose()
-    if options.slam:
-        navigator._waitForNodeToActivate("bt_navigator")
-    else:
-        navigator.setInitialPose(stamped(start))
-        navigator.waitUntilNav2Active()
+    navigator.setInitialPose(stamped(true_pose()))
+    navigator.waitUntilNav2Active()
     done = []
     for x, y in options.goals:
         goal = stamped(Pose())
@@ -63,11 +57,10 @@ def main() -> None:
         sim_s = (navigator.get_clock().now() - sim_began).nanoseconds * 1e-9
         true_pose()  # what waited is older
         at = true_pose().position
-        off = (at.x - x, at.y - y) if not options.slam else (at.x - start.position.x - x, at.y - y)
         done.append(
             {
                 "reached": navigator.getResult() == TaskResult.SUCCEEDED,
-                "off_m": round(math.hypot(*off), 3),
+                "off_m": round(math.hypot(at.x - x, at.y - y), 3),
                 "sim_s": round(sim_s, 1),
                 "real_s": round(time.monotonic() - began, 1),
             }

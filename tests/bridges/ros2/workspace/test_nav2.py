@@ -1,6 +1,6 @@
 """Nav2 and slam_toolbox beside a run, by the launch files and parameters of ruedo_ros.
 
-At real time or less, on two cores: each robot has a Nav2 of its own. The referee is the true pose.
+At half of real time, on two cores. The referee is the true pose.
 """
 
 from __future__ import annotations
@@ -110,34 +110,6 @@ def test_goals_are_reached(tmp_path):
             assert arrived(answer(script(ros, "navigate.py", "", [[-3.5, 0.0], [-1.0, -3.8]])))
 
 
-FLEET = SOURCE / "worlds/fleet.sdf"
-ACROSS = {"alice": [[-6.0, 4.0]], "bob": [[-6.0, -4.5]], "carol": [[6.0, 4.5]]}
-
-
-@needs(*OF_NAV2)
-def test_three_robots_navigate_at_once(tmp_path):
-    remaps = [
-        word for name in ACROSS for word in ("--remap", f"/{name}/initialpose=/{name}/set_pose")
-    ]
-    file = map_of(FLEET, tmp_path)
-    with Run("--rate", "0.3", *remaps, world=FLEET, lcm="memq://") as run:
-        ros = Ros(run, MIDDLEWARES[0])
-        with contextlib.ExitStack() as stack:
-            for name in ACROSS:
-                robot = parameters(tmp_path, FLEET, "--robot", name)
-                words = [
-                    f"namespace:={name}",
-                    f"robot:={robot}",
-                    f"map:={file}",
-                    "rviz:=False",
-                    *PROCESSES,
-                ]
-                log = tmp_path / f"{name}.log"
-                stack.enter_context(launched(ros, log, "ruedo_ros", "nav2.launch.py", *words))
-            all_at_once = [script(ros, "navigate.py", name, ACROSS[name]) for name in ACROSS]
-            assert all(arrived(answer(process)) for process in all_at_once)
-
-
 ROUTES = {
     "arena": [
         *([0, 3.7], [3.8, 3.7], [4.3, 0.4], [4.2, -3.8], [-3.9, -3.8], [-3.9, 1.5], [-2, 2.9]),
@@ -162,17 +134,6 @@ def test_slam_gives_the_true_map(tmp_path, world):
             found = answer(script(ros, "survey.py", file, ROUTES[world]))
     assert min(found["right"], found["walls"], found["found"]) >= 0.95
     assert found["off_m"] <= 0.1
-
-
-@needs("slam_toolbox", *OF_NAV2)
-def test_goals_are_reached_while_slam_maps(tmp_path):
-    robot = parameters(tmp_path, "p3at")
-    words = ["ruedo_ros", "nav2.launch.py", "slam:=True", f"robot:={robot}", "rviz:=False"]
-    words += PROCESSES
-    with Run("--rate", "0.5", lcm="memq://") as run:
-        ros = Ros(run, MIDDLEWARES[0])
-        with launched(ros, tmp_path / "nav2.log", *words):
-            assert arrived(answer(script(ros, "navigate.py", "--slam", "", [[-3.5, 0.0]])))
 
 
 def merged(base, over):
