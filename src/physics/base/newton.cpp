@@ -18,10 +18,11 @@ constexpr double kYieldsFirst = 0.1, kYieldsStiff = 1e-3, kYieldsLeast = 1e-8, k
 constexpr double kSlopeLeft = 0.05;
 constexpr int kMostTrials = 12;
 // Newton's method has done its part for these multipliers once its error is this part of theirs.
-constexpr double kErrorLeft = 0.1;
-// If the slips' error does not fall to this part, they change each other: then aims follow them by
-// smaller parts, down to the least.
-constexpr double kFalls = 0.7, kRelaxed = 0.5, kLeastRelaxation = 0.25;
+constexpr double kErrorLeft = 0.3;
+// Updates of the multipliers that do not shrink their error to this part need stiffer springs.
+constexpr double kFalls = 0.7;
+// The secant method goes further by at most three times an error, and back by at most this part.
+constexpr double kLeastBack = -3.0, kMostBack = 0.75;
 
 constexpr double kHuge = std::numeric_limits<double>::infinity();
 
@@ -170,26 +171,35 @@ void Newton::set_bounds() {
   }
 }
 
-void Newton::pull(Bound& bound, double part) {
+double Newton::wanted(const Bound& bound, double part) {
   const double missing = bound.missing - bound.moves - part * bound.turns -
                          bound.row->softness * (bound.held - bound.begun);
-  const double wanted = bound.held + bound.weight * missing;
+  return bound.held + bound.weight * missing;
+}
+
+void Newton::pull(Bound& bound, double part) {
+  const double wanted = Newton::wanted(bound, part);
   bound.pulls = std::clamp(wanted, bound.lower, bound.upper);
   bound.active = bound.pulls == wanted;
 }
 
-// The point of the cone that is nearest to the wanted impulses, each measured by its softness.
-void Newton::pull(Contact& contact, double part) {
+Vec3 Newton::wanted(const Contact& contact, double part) {
   const Vec3 missing = contact.missing - contact.moves - part * contact.turns -
                        contact.softness.cwiseProduct(contact.held - contact.begun);
-  const double load = contact.held[0] + contact.weight * (missing[0] - contact.slip);
+  return contact.held + Vec3(contact.weight * (missing[0] - contact.slip),
+                             contact.weight_t * missing[1], contact.weight_t * missing[2]);
+}
+
+// The point of the cone that is nearest to the wanted impulses, each measured by its softness.
+void Newton::pull(Contact& contact, double part) {
+  const Vec3 wanted = Newton::wanted(contact, part);
+  const double load = wanted[0];
   if (!contact.rows[1]) {
     contact.zone = load > 0.0 ? Zone::sticks : Zone::open;
     contact.pulls = Vec3(std::max(load, 0.0), 0.0, 0.0);
     return;
   }
-  const double first = contact.held[1] + contact.weight_t * missing[1],
-               second = contact.held[2] + contact.weight_t * missing[2];
+  const double first = wanted[1], second = wanted[2];
   const double size = math::hypot(first, second), ratio = contact.weight / contact.weight_t;
   if (size <= load) {
     contact.zone = Zone::sticks;
@@ -206,6 +216,30 @@ void Newton::pull(Contact& contact, double part) {
     contact.zone = Zone::open;
     contact.pulls = Vec3::Zero();
   }
+}
+
+// The same as if each row remained in its zone. What multipliers, aims and weights change is small;
+// but it acts on stiff springs, which would leave their zones, and return by the next step.
+void Newton::pull_in_zones() {
+  for (Bound& bound : bounds_) {
+    const double wanted = Newton::wanted(bound, 0.0);
+    bound.pulls = bound.active ? wanted : std::clamp(wanted, bound.lower, bound.upper);
+  }
+  for (Contact& contact : contacts_) {
+    const Vec3 wanted = Newton::wanted(contact, 0.0);
+    if (contact.zone == Zone::open) {
+      contact.pulls = Vec3::Zero();
+    } else if (contact.zone == Zone::sticks) {
+      contact.pulls = contact.rows[1] ? wanted : Vec3(wanted[0], 0.0, 0.0);
+    } else {
+      const double c = contact.cosine, s = contact.sine, ratio = contact.weight / contact.weight_t;
+      const double held = (wanted[0] + ratio * (c * wanted[1] + s * wanted[2])) / (1.0 + ratio),
+                   across = contact.sideways / contact.weight_t * (c * wanted[2] - s * wanted[1]);
+      contact.pulls = Vec3(held, c * held - s * across, s * held + c * across);
+      contact.stiffness = contact.weight / (1.0 + ratio);
+    }
+  }
+  find_gradient();
 }
 
 Vec3 Newton::stiffness_times(const Contact& contact, const Vec3& u) const {
@@ -237,13 +271,14 @@ double Newton::slope(double part) {
 }
 
 // How far to go along the step: to where the function is least, found by Newton's method in a
-// bracket.
+// bracket. 0: the step, which assumed that zones last, leads up.
 double Newton::search() {
   const double begin = slope(0.0);
   double part = 1.0, low = 0.0, high = 1.0;
   for (int k = 0; k < kMostTrials; ++k) {
     const double here = slope(part);
     if (std::abs(here) <= kSlopeLeft * std::abs(begin) || (here < 0.0 && part >= 1.0)) break;
+    if (begin >= 0.0) return 0.0;
     (here > 0.0 ? high : low) = part;
     part -= here / curvature_;
     if (!(part > low && part < high)) part = 0.5 * (low + high);
@@ -334,22 +369,40 @@ void Newton::find_step() {
   }
 }
 
-// Updates the multipliers by the current impulses.
-Newton::Errors Newton::take_multipliers(double relaxation) {
+// Updates the multipliers by the current impulses, and the slips that the aims assume. These change
+// each other: the secant method for the slips of all contacts (D. Anderson, "Iterative procedures
+// for nonlinear integral equations", 1965, with one step of memory).
+Newton::Errors Newton::take_multipliers(bool first) {
   Errors most;
   const auto take = [&](double& held, double pulls, double response) {
     most.yielded = std::max(most.yielded, yields_ * std::abs(pulls - held) * response);
     held = pulls;
   };
   for (Bound& bound : bounds_) take(bound.held, bound.pulls, bound.row->response);
+  double product = 0.0, square = 0.0;
   for (Contact& contact : contacts_) {
     take(contact.held[0], contact.pulls[0], contact.rows[0]->response);
     if (!contact.rows[1]) continue;
     contact.held.tail<2>() = contact.pulls.tail<2>();
-    const double slip =
-        math::hypot(contact.missing[1] - contact.moves[1], contact.missing[2] - contact.moves[2]);
-    most.slipped = std::max(most.slipped, std::abs(slip - contact.slip));
-    contact.slip += relaxation * (slip - contact.slip);
+    const Vec3 missing = contact.missing - contact.moves;
+    const double slip = math::hypot(missing[1], missing[2]);
+    contact.slip_error = slip - contact.slip;
+    contact.bears = contact.pulls[0] > 0.0 || missing[0] > slip;
+    if (!contact.bears) continue;
+    most.slipped = std::max(most.slipped, std::abs(contact.slip_error));
+    const double change = contact.slip_error - contact.last_error;
+    product += contact.slip_error * change;
+    square += change * change;
+  }
+  const double back =
+      first || square == 0.0 ? 0.0 : std::clamp(product / square, kLeastBack, kMostBack);
+  for (Contact& contact : contacts_) {
+    const double on = contact.slip + contact.slip_error;
+    const double before = contact.last_slip + contact.last_error;
+    const double next = contact.bears ? on - back * (on - before) : on;
+    contact.last_slip = contact.slip;
+    contact.last_error = contact.slip_error;
+    contact.slip = std::max(next, 0.0);
   }
   set_bounds();
   return most;
@@ -392,16 +445,13 @@ bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
   start(bodies);
   go_on(0.0);
   double small = tolerance;  // error that ends Newton's method for these multipliers
-  double relaxation = 1.0;
   Errors last = {kHuge, kHuge};
   bool factored = false, done = false;
   for (int i = 0; i < most_steps; ++i) {
     if (furthest(gradient_) <= small) {
-      const Errors errors = take_multipliers(relaxation);
+      const Errors errors = take_multipliers(last.slipped == kHuge);
       done = std::max(errors.yielded, errors.slipped) <= tolerance;
       if (done) break;
-      if (errors.slipped > kFalls * last.slipped)
-        relaxation = std::max(kRelaxed * relaxation, kLeastRelaxation);
       const double least = errors.yielded > kFalls * last.yielded ? kYieldsLeast : kYieldsStiff;
       small = std::max(tolerance, kErrorLeft * std::max(errors.yielded, errors.slipped));
       if (errors.yielded > tolerance && yields_ > least) {
@@ -409,7 +459,7 @@ bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
         factored = false;
       }
       last = errors;
-      go_on(0.0);
+      pull_in_zones();
     }
     if (!factored || any_slips() || !same_zones()) {
       assemble();

@@ -73,6 +73,8 @@ class Newton {
     double weight = 0.0, weight_t = 0.0;  // stiffness of the springs
     Vec3 softness = Vec3::Zero(), missing = Vec3::Zero(), begun = Vec3::Zero(), held = Vec3::Zero();
     double slip = 0.0;  // speed that the aim assumes, times the friction
+    double slip_error = 0.0, last_slip = 0.0, last_error = 0.0;  // of the aim's slip
+    bool bears = false;                                          // or would, if it did not slip
     Vec3 moves = Vec3::Zero(), turns = Vec3::Zero(), pulls = Vec3::Zero();
     Zone zone = Zone::open, was = Zone::open;
     double sine = 0.0, cosine = 1.0;         // of the impulse's direction in the plane
@@ -84,8 +86,11 @@ class Newton {
   void start(const SolverBodies& bodies);
   void set_weights(double yields);
   void set_bounds();
+  static double wanted(const Bound& bound, double part);
+  static Vec3 wanted(const Contact& contact, double part);
   void pull(Bound& bound, double part);
   void pull(Contact& contact, double part);
+  void pull_in_zones();
   Vec3 stiffness_times(const Contact& contact, const Vec3& u) const;
   double slope(double part);
   double search();
@@ -100,7 +105,7 @@ class Newton {
   struct Errors {
     double yielded = 0.0, slipped = 0.0;
   };
-  Errors take_multipliers(double relaxation);
+  Errors take_multipliers(bool first);
   double furthest(const std::vector<Six>& change) const;
   void give(SolverBodies& bodies) const;
 

@@ -28,8 +28,9 @@ constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps =
 constexpr int kSweepsBeforeSharing = 10;
 constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
 constexpr size_t kFewBodies = 2;         // something immovable and one body: sweeps are faster
-// Piles in motion are solved to this part of the speed at which they meet and slip.
-constexpr double kOfSpeed = 1e-3;
+// Piles in motion are solved to this part of the speed at which they meet and slip, and those that
+// stand to this part of the tolerance: what is left moves them a little in each substep.
+constexpr double kOfSpeed = 1e-3, kStanding = 0.1;
 // Of Newton's method, so that the sweep that follows finds nothing left to do.
 constexpr double kOfTolerance = 0.5;
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
@@ -58,6 +59,14 @@ Row linear_row(int a, int b, const Vec3& direction, const Vec3& arm_a, const Vec
   row.linear_b = -direction;
   row.angular_b = -arm_b.cross(direction);
   return row;
+}
+
+// Before forces acted.
+double velocity_before(const Row& row, const SolverBodies& bodies) {
+  const SolverBody& A = bodies[row.a];
+  const SolverBody& B = bodies[row.b];
+  return row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) + row.linear_b.dot(B.v0) +
+         row.angular_b.dot(B.w0);
 }
 
 Row angular_row(int a, int b, const Vec3& direction) {
@@ -213,10 +222,7 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
                         : 0.0;
   if (surface.restitution <= 0.0) return;
   // The velocity at the time of impact, somewhere within the substep: forces act until then only.
-  const SolverBody& A = bodies_[row.a];
-  const SolverBody& B = bodies_[row.b];
-  const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) +
-                          row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
+  const double before = -velocity_before(row, bodies_);
   const double acceleration = (-row.velocity(bodies_) - before) / substep_s;
   const double square = before * std::abs(before) + 2.0 * acceleration * std::max(gap, 0.0);
   const double rebound = square > 0.0 ? surface.restitution * std::sqrt(square) : 0.0;
@@ -365,16 +371,17 @@ double Solver::sweep(int number) {
   return worst;
 }
 
-// The accuracy at which sweeps end. To be called before the first one.
+// The accuracy at which sweeps end. It follows the velocities of the last substep, which forces
+// have not changed yet: what stands is solved more accurately than what moves.
 double Solver::tolerance() const {
   if (!blocks_.empty() || bodies_.size() <= kFewBodies + 1) return settings_.tolerance_m_s;
   double fastest = 0.0;
   for (size_t c = 0; c < contact_count_; ++c) {
     const ContactRows& contact = contacts_[c];
     for (const Row* row : {&contact.normal, &contact.along, &contact.across})
-      fastest = std::max(fastest, std::abs(row->velocity(bodies_)));
+      fastest = std::max(fastest, std::abs(velocity_before(*row, bodies_)));
   }
-  return std::max(settings_.tolerance_m_s, kOfSpeed * fastest);
+  return std::max(kStanding * settings_.tolerance_m_s, kOfSpeed * fastest);
 }
 
 // If that does not converge soon, all rows are solved at once; a solution that did not improve
