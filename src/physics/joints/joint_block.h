@@ -1,5 +1,7 @@
 // The joints of mechanisms. Those of one mechanism form a block that is solved directly: as a tree
-// (joint_tree.h), or as rows if joints close a loop or are of other kinds.
+// (joint_tree.h), or as rows if joints close a loop or are of other kinds. joint_block.cpp sorts
+// joints into blocks, joint_rows.cpp makes their rows, joint_matrix.cpp factors those of loops, and
+// joint_stops.cpp finds which motors and stops of a tree hold.
 #pragma once
 
 #include <cstddef>
@@ -143,6 +145,7 @@ class JointBlocks {
                : nullptr;
   }
   double softness_of(size_t motor) const;
+  static bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
   double bound_of(const Spent& spent) const {
     return spent.upper ? rows_[spent.row].upper : rows_[spent.row].lower;
   }
