@@ -416,6 +416,7 @@ def test_a_page_records_a_log(tmp_path):
     assert there[-1][2] > there[0][2] + 0.2
     moments = [there[round(share * (len(there) - 1))] for share in (0.9, 0.2, 0.6, 0.1, 1.0)]
     given = {
+        "channels": ["p3at/velocity", "ruedo/world"],  # a page gets no hashes
         "moments": [
             {"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n}
             for t, sim, x, y, n in moments

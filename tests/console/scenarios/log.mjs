@@ -1,5 +1,6 @@
 // A recorded run: the time line, and that the page shows what the log has at each moment. Given:
-// moments of the log, with the pose of the robot's body then, and the bodies that there are then.
+// moments of the log, with the pose of the robot's body then, and the bodies that there are then;
+// channels that it has, if they are not the usual ones.
 export default async function log({ page, given, seen, until, check, picture }) {
   await until("the time line is there", () => !document.getElementById("timeline").hidden);
   await until("robots are listed", () => window.ruedo?.page.now.world?.robots.length > 0);
@@ -112,9 +113,8 @@ export default async function log({ page, given, seen, until, check, picture }) 
   await page.getByRole("tab", { name: "Channels" }).click();
   await until(
     "the channels of the log are listed",
-    () =>
-      document.querySelector('tr[data-channel="ruedo/state_hash"]') &&
-      document.querySelector('tr[data-channel="ruedo/world"]'),
+    (names) => names.every((name) => document.querySelector(`tr[data-channel="${name}"]`)),
+    given.channels ?? ["ruedo/state_hash", "ruedo/world"],
   );
   check(
     "a recorded run cannot be steered",
