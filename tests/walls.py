@@ -55,6 +55,7 @@ ROOMS = {
         "edit",
         "sdf",
     ),
+    "physics": ("base", "collision", "joints", "dynamics", "bodies"),
 }
 
 
@@ -792,6 +793,8 @@ def test_walls_are_seen(tmp_path, name, include, good):
         ("src/world/sdf/sdf_world.cpp", '"world/load.h"', False),
         ("src/world/load.cpp", '"world/sdf/sdf_reader.h"', True),
         ("src/world/cellar/x.cpp", '"world/model/world_model.h"', False),
+        ("src/physics/joints/joint_tree.cpp", '"physics/dynamics/solver.h"', False),
+        ("src/physics/bodies/joints.cpp", '"physics/joints/joint_block.h"', True),
     ],
 )
 def test_walls_of_rooms_are_seen(tmp_path, name, include, good):

@@ -16,7 +16,7 @@ struct LiveHost {
   std::function<std::shared_ptr<const world::WorldModel>()> world;
   std::function<std::string(const std::string& name)> model_text;
   std::function<void(const std::string& channel, std::span<const uint8_t> message)> on_message;
-  std::function<uint64_t()> lost;  // messages that the bus could not send
+  std::function<uint64_t()> lost;                    // messages that the bus could not send
   std::function<std::vector<uint8_t>()> log_header;  // null: none
   std::string save_name;                             // of the file written by SAVE
 };

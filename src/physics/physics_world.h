@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "physics/base/servo.h"
 #include "ruedo/snapshot.h"
 #include "ruedo/state_archive.h"
 #include "world/model/body_layout.h"
@@ -21,18 +22,6 @@ enum class Support {
   contacts,  // six degrees of freedom, contacts with everything
   plane      // moves in its plane only (x, y, world yaw); no pair with static planes
 };
-
-// The torque (or force) that the servo of a wheel or joint gives until the next command: gain *
-// (rate - actual rate), within the limits. It is integrated implicitly, and therefore stable for
-// any gain.
-struct WheelServo {
-  double rate = 0.0;                                 // rad/s, positive rolls forward
-  double gain = 0.0;                                 // N m s/rad
-  double lowest_torque = 0.0, highest_torque = 0.0;  // N m
-};
-
-// What messages can change of a joint: N m s/rad or N s/m; N m or N; rad/s or m/s.
-enum class JointSetting { rate_gain, effort, velocity };
 
 // Deterministic: the same calls give the same bits, and bodies that do not touch do not affect each
 // other. A step is divided into equal substeps of at most 5 ms; of at most 1 ms for what joints

@@ -6,14 +6,14 @@
 #include <memory>
 #include <vector>
 
-#include "physics/base/rigid_bodies.h"
+#include "physics/bodies/contact_book.h"
+#include "physics/bodies/joints.h"
+#include "physics/bodies/rigid_bodies.h"
+#include "physics/bodies/surfaces.h"
 #include "physics/changes.h"
 #include "physics/collision/broadphase.h"
-#include "physics/collision/contact_book.h"
 #include "physics/collision/detection.h"
 #include "physics/dynamics/dynamics.h"
-#include "physics/dynamics/surfaces.h"
-#include "physics/joints/joints.h"
 #include "physics/physics_world.h"
 
 namespace ruedo::physics {

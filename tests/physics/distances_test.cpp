@@ -1,5 +1,5 @@
 // Distances: closed forms, a table by another library, and which things carry a robot.
-#include "physics/collision/distances.h"
+#include "physics/bodies/distances.h"
 
 #include <fstream>
 #include <numbers>

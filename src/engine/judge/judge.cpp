@@ -9,7 +9,7 @@
 
 #include "base/channel_names.h"
 #include "base/whole.h"
-#include "physics/collision/distances.h"
+#include "physics/bodies/distances.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/fault_t.hpp"

@@ -1,6 +1,6 @@
 // Mass properties and compound shapes. Inertias of the links are combined about the common centre
 // of mass (parallel axes).
-#include "physics/base/rigid_bodies.h"
+#include "physics/bodies/rigid_bodies.h"
 
 #include <algorithm>
 #include <cmath>

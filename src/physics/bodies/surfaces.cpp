@@ -1,11 +1,11 @@
 // The lower of two friction coefficients counts, as in ODE and Gazebo; two compliant surfaces act
 // as springs in series.
-#include "physics/dynamics/surfaces.h"
+#include "physics/bodies/surfaces.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "physics/base/rigid_bodies.h"
+#include "physics/bodies/rigid_bodies.h"
 #include "ruedo/math.h"
 
 namespace ruedo::physics {

@@ -1,12 +1,12 @@
 // Converts manifolds to contacts. Their order is by links and then by position, independent of
 // Bullet's.
-#include "physics/collision/contact_book.h"
+#include "physics/bodies/contact_book.h"
 
 #include <algorithm>
 #include <tuple>
 #include <utility>
 
-#include "physics/base/rigid_bodies.h"
+#include "physics/bodies/rigid_bodies.h"
 
 namespace ruedo::physics {
 

@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include "physics/base/rigid_bodies.h"
 #include "physics/base/rows.h"
-#include "physics/physics_world.h"
+#include "physics/base/servo.h"
+#include "physics/bodies/rigid_bodies.h"
 #include "ruedo/state_archive.h"
 #include "world/model/body_layout.h"
 

@@ -1,7 +1,7 @@
 // Hinges, sliders, ball and universal joints. Friction acts like a motor with rate 0 and a bounded
 // impulse, damping like one whose impulse is in proportion to the rate that results: however large
 // they are, they never reverse a motion.
-#include "physics/joints/joints.h"
+#include "physics/bodies/joints.h"
 
 #include <algorithm>
 #include <cmath>

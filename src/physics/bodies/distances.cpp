@@ -1,6 +1,6 @@
 // Bounding boxes choose the pairs of shapes, the nearest first; GJK measures those whose boxes are
 // nearer than the best so far.
-#include "physics/collision/distances.h"
+#include "physics/bodies/distances.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include <BulletCollision/CollisionShapes/btTriangleShape.h>
 
-#include "physics/base/rigid_bodies.h"
+#include "physics/bodies/rigid_bodies.h"
 #include "physics/collision/closest_points.h"
 #include "physics/collision/shapes.h"
 

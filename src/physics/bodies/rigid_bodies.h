@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "physics/base/bullet.h"
+#include "physics/bodies/surfaces.h"
 #include "physics/collision/convex_shapes.h"
 #include "physics/collision/shapes.h"
-#include "physics/dynamics/surfaces.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::physics {

@@ -1,0 +1,18 @@
+// What motors of wheels and joints are told.
+#pragma once
+
+namespace ruedo::physics {
+
+// The torque (or force) that the servo of a wheel or joint gives until the next command: gain *
+// (rate - actual rate), within the limits. It is integrated implicitly, and therefore stable for
+// any gain.
+struct WheelServo {
+  double rate = 0.0;                                 // rad/s, positive rolls forward
+  double gain = 0.0;                                 // N m s/rad
+  double lowest_torque = 0.0, highest_torque = 0.0;  // N m
+};
+
+// What messages can change of a joint: N m s/rad or N s/m; N m or N; rad/s or m/s.
+enum class JointSetting { rate_gain, effort, velocity };
+
+}  // namespace ruedo::physics
