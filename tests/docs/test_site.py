@@ -33,7 +33,7 @@ APPENDIX = {
     "robots/README.md",
 }
 PAGES = [
-    *(ROOT / name for name in ("CONTRIBUTING.md", "SECURITY.md", "README.md")),
+    *(ROOT / name for name in ("CONTRIBUTING.md", "SECURITY.md")),
     *(
         p
         for p in sorted((ROOT / "docs").rglob("*.md"))
