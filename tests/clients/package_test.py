@@ -68,8 +68,8 @@ def test_jar_is_whole_and_for_java_11():
     with zipfile.ZipFile(jar) as archive:
         names = set(archive.namelist())
         assert {"ruedo/Ruedo.class", "ruedo/lcmtypes/world_info_t.class"} <= names
-        # Of LCM it has the interface of messages alone: LCM's own jar may lie beside it on the class
-        # path.
+        # Of LCM it has the interface of messages alone, so that LCM's own jar may lie beside it on
+        # the class path.
         others = {n for n in names if not n.startswith(("META-INF/", "ruedo/")) and n[-1] != "/"}
         assert others == {"lcm/lcm/LCMEncodable.class"}
         for name in names:

@@ -8,7 +8,7 @@ const kMostNames = 3; // of a class
 export function pictureSource(
   { world, scene }: Pick<PageState, "world" | "scene">,
   device: device_info_t | undefined,
-): { kind: string; nameOf(label: number): string } {
+): { kind: string; nameOf: (label: number) => string } {
   const ofClass = (label: number): string[] =>
     (scene?.classes ?? []).filter(([each]) => each === label).flatMap(([, ...models]) => models);
   const kind = device?.kind ?? "";
