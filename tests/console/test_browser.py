@@ -420,7 +420,7 @@ def test_a_page_records_a_log(tmp_path):
         "moments": [
             {"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n}
             for t, sim, x, y, n in moments
-        ]
+        ],
     }
     with playing(log) as process:
         browse(process.url, tmp_path, "log", given)

@@ -108,7 +108,9 @@ class JointStream(Stream[Joints]):
     def __getitem__(self, name: str) -> Joint:
         """Raises UnknownName, which lists the joints."""
         limits = limits_of(self._link, self._of_robot.name)
-        return Joint(self._of_robot, limits, limits.names.index(checked(self._of_robot.name, limits, name)))
+        return Joint(
+            self._of_robot, limits, limits.names.index(checked(self._of_robot.name, limits, name))
+        )
 
     @property
     def names(self) -> list[str]:
