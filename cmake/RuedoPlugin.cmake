@@ -23,7 +23,7 @@ set_source_files_properties(src/system/plugins.cpp PROPERTIES INCLUDE_DIRECTORIE
 target_link_libraries(ruedo_system PUBLIC ${CMAKE_DL_LIBS})
 
 add_library(ruedo_plugin STATIC src/base/element.cpp src/base/errors.cpp src/base/kinds.cpp src/base/math/atan2.cpp src/base/math/c_names.cpp
-  src/base/nearest_word.cpp src/base/quantity.cpp src/base/random.cpp src/base/sim_time.cpp src/base/utf8.cpp src/world/model/link_in_body.cpp src/sensors/noise.cpp
+  src/base/nearest_word.cpp src/base/quantity.cpp src/base/random.cpp src/base/sim_time.cpp src/base/text.cpp src/base/utf8.cpp src/world/model/link_in_body.cpp src/sensors/noise.cpp
   ${RUEDO_MATH_OBJECT} ${RUEDO_PLUGIN_ABI})
 add_library(ruedo::plugin ALIAS ruedo_plugin)
 set_target_properties(ruedo_plugin PROPERTIES EXPORT_NAME plugin CXX_VISIBILITY_PRESET hidden)

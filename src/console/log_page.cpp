@@ -13,9 +13,9 @@
 
 #include <fmt/format.h>
 
+#include "base/base64.h"
 #include "base/channel_names.h"
 #include "base/json.h"
-#include "base/text.h"
 #include "base/utf8.h"
 #include "console/assets.h"
 #include "console/board.h"

@@ -159,4 +159,4 @@ def test_the_way_to_a_snapshot_says_how_far_it_is(log, tmp_path):
         until=r"far.snapshot: 0 %, \d+:\d\d h left",
     )
     assert code == 0, said
-    assert "the world runs there again, 100000000000 steps" in said
+    assert "re-simulating 100000000000 steps" in said

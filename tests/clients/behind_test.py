@@ -83,7 +83,7 @@ def test_who_is_not_waited_for_gets_the_newest(unwaited, caplog):
     assert len(warnings) <= 1
     server.terminate()
     told = server.stderr.read().decode()
-    assert told.count("takes its messages more slowly") + len(warnings) >= 1
+    assert told.count("reads more slowly") + len(warnings) >= 1
 
 
 def test_a_servers_warnings_reach_the_program_once(caplog):

@@ -768,7 +768,7 @@ def test_wrong_actions_are_refused():
     fleet.reset(seed=1)
     for actions, text in (
         ({"robot0": good[0]}, "no action for robot1"),
-        ({"robot0": good[0], "robot1": good[0], "robot2": good[0]}, "'robot2' is none of"),
+        ({"robot0": good[0], "robot1": good[0], "robot2": good[0]}, "'robot2' is not one of"),
         (good, "actions are a dict"),
     ):
         with pytest.raises((ValueError, TypeError), match=text):

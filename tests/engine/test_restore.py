@@ -84,7 +84,7 @@ class Server:
 
     @property
     def ran_again(self):
-        return "runs there again" in self.said.read_text()
+        return "re-simulating" in self.said.read_text()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 7, 9, 12])

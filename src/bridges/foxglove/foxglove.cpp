@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "base/base64.h"
 #include "base/channel_names.h"
 #include "base/json.h"
-#include "base/text.h"
 #include "base/utf8.h"
 #include "bridges/foxglove/foxglove_json.h"
 #include "bridges/foxglove/message_json.h"

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "base/base64.h"
 #include "base/big_endian.h"
 #include "base/json.h"
-#include "base/text.h"
 #include "base/utf8.h"
 #include "base/wire_size.h"
 

@@ -113,8 +113,12 @@ int play(const PlayArguments& arguments) {
         bus.url().str(), server);
   log::Event event;
   int64_t messages = 0;
+  uint64_t not_sent = 0;
   SimTime first_us = 0;
   Clock::time_point begin;
+  if (arguments.waits && !run.serves())
+    throw InputError({arguments.log},
+                     "has no ruedo/header, so no client can join it: leave out --wait");
   while (arguments.waits && !interrupted && !run.asked()) std::this_thread::sleep_for(kShortSleep);
   while (!interrupted && log.next(event)) {
     if (in_logs_only(event.channel)) continue;
@@ -123,7 +127,9 @@ int play(const PlayArguments& arguments) {
     if (std::isfinite(speed) &&
         !sleep_until(due(begin, event.timestamp_us - first_us, speed), run, event.timestamp_us))
       break;
+    const uint64_t failed = bus.failed();
     bus.publish(event.channel, event.data.data(), event.data.size());
+    not_sent += bus.failed() - failed;
     ++messages;
   }
   run.end();
@@ -132,7 +138,7 @@ int play(const PlayArguments& arguments) {
       messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
   fmt::print("{}: {} messages, {:g} s, on {}{}{}\n", arguments.log, messages, seconds,
              bus.url().str(), interrupted ? "; interrupted" : "",
-             bus.failed() == 0 ? "" : fmt::format("; {} not sent", bus.failed()));
+             not_sent == 0 ? "" : fmt::format("; {} not sent", not_sent));
   return kGood;
 }
 

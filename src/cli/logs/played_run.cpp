@@ -24,14 +24,11 @@ int64_t random_id() {
 }  // namespace
 
 PlayedRun::PlayedRun(const std::string& path, bus::LcmBus& bus) : bus_(bus), run_id_(random_id()) {
-  if (!std::filesystem::is_regular_file(path)) {
+  if (std::filesystem::is_regular_file(path)) make_worlds(path);
+  if (!worlds_) {
     bus_.keep_connected();
     return;
   }
-  const log::Index index(path);
-  worlds_ = std::make_unique<run::LogWorlds>(
-      index, [&](const log_header_t& header) { return load_run(header, path); });
-  if (!worlds_->fault().empty()) to_stderr("ruedo: {}: {}\n", path, worlds_->fault());
   bus_.listen({kRequestChannel},
               [this](const std::string&, const uint8_t* data, size_t size) {
                 request_t request;
@@ -43,6 +40,15 @@ PlayedRun::PlayedRun(const std::string& path, bus::LcmBus& bus) : bus_(bus), run
 }
 
 PlayedRun::~PlayedRun() { bus_.stop(); }
+
+// Of a run of Ruedo's; any other log of LCM is played as it is.
+void PlayedRun::make_worlds(const std::string& path) {
+  const log::Index index(path);
+  if (!index.header()) return;
+  worlds_ = std::make_unique<run::LogWorlds>(
+      index, [&](const log_header_t& header) { return load_run(header, path); });
+  if (!worlds_->fault().empty()) to_stderr("ruedo: {}: {}\n", path, worlds_->fault());
+}
 
 void PlayedRun::serve(SimTime time_us) {
   if (!worlds_) return;
@@ -66,6 +72,7 @@ void PlayedRun::publish(const std::vector<std::vector<uint8_t>>& parts, SimTime 
 }
 
 void PlayedRun::end() {
+  if (!worlds_) return;
   reply_t last{};
   last.run_id = run_id_;
   last.code = reply_t::ENDED;

@@ -26,14 +26,16 @@ class PlayedRun {
   // Publishes ruedo/info where it is due: once a second of real time, when the world has changed,
   // and when a client has asked.
   void serve(SimTime time_us);
-  bool asked() const { return asked_; }  // by a client, since the last info
-  void end();                            // the log is over, as clients are told
+  bool serves() const { return worlds_ != nullptr; }  // else it is played without ruedo/info
+  bool asked() const { return asked_; }               // by a client, since the last info
+  void end();                                         // the log is over, as clients are told
 
  private:
+  void make_worlds(const std::string& path);
   void publish(const std::vector<std::vector<uint8_t>>& parts, SimTime time_us);
 
   bus::LcmBus& bus_;
-  std::unique_ptr<run::LogWorlds> worlds_;  // null: the log can be read once only
+  std::unique_ptr<run::LogWorlds> worlds_;  // null: of no run, or a log that can be read once only
   const int64_t run_id_;
   std::atomic<bool> asked_{false};
   size_t scene_ = 0;

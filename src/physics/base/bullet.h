@@ -27,4 +27,9 @@ inline Pose from_bt(const btTransform& X) {
   return {from_bt(X.getRotation()), from_bt(X.getOrigin())};
 }
 
+// The length (s) of the substep that a contact point's impulses are of; 0: it has none yet. It lies
+// in a field of Bullet's own solver, which does not run here.
+inline btScalar& substep_of(btManifoldPoint& point) { return point.m_prevRHS; }
+inline btScalar substep_of(const btManifoldPoint& point) { return point.m_prevRHS; }
+
 }  // namespace ruedo::physics

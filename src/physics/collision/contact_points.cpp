@@ -118,7 +118,7 @@ void inherit(btManifoldPoint& point, const btManifoldPoint& from) {
   point.m_appliedImpulseLateral2 = from.m_appliedImpulseLateral2;
   point.m_lateralFrictionDir1 = from.m_lateralFrictionDir1;
   point.m_lateralFrictionDir2 = from.m_lateralFrictionDir2;
-  point.m_prevRHS = from.m_prevRHS;
+  substep_of(point) = substep_of(from);
   point.m_lifeTime = from.m_lifeTime;
 }
 

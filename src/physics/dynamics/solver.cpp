@@ -11,6 +11,7 @@ namespace ruedo::physics {
 
 namespace {
 
+// A slower rebound would lift a body by less than kRestingDepth_m: v^2 / 2 g = 5e-8 m.
 constexpr double kSlowestBounce_m_s = 1e-3;
 // Penetration up to this depth is not corrected: otherwise bodies at rest would be lifted a little,
 // fall a little, and rock.
@@ -18,11 +19,17 @@ constexpr double kRestingDepth_m = 5e-5;
 // A loaded contact keeps its load up to this gap, and nothing stands higher than the rest by more.
 // Real surfaces yield by more.
 constexpr double kTouching_m = 1e-5;
+// A contact without a load that opens faster than this bears none: in a substep of 1 ms it opens by
+// a tenth of kTouching_m.
 constexpr double kStanding_m_s = 1e-3;
+// Of the correction of penetration. What they leave is corrected in the next substep, since the
+// depth is measured anew; the tolerance moves a body by 50 nm in a substep of 5 ms.
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
 // Sweeps before the first check, and between checks; a factorization may cost as much as that many
 // sweeps.
+// kNewtonSteps bounds the work where Newton's method does not converge: the sweeps go on from what
+// it reached.
 constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 30;
 // With friction, sweeps do not converge while few contacts bear the whole load.
 constexpr int kSweepsBeforeSharing = 10;
@@ -33,6 +40,8 @@ constexpr size_t kFewBodies = 2;         // something immovable and one body: sw
 constexpr double kOfSpeed = 1e-3, kStanding = 0.1;
 // Of Newton's method, so that the sweep that follows finds nothing left to do.
 constexpr double kOfTolerance = 0.5;
+// Newton's method pays where a factorization costs at most as much as kSweepsForAFactor sweeps, of
+// kProductsOfARow products for each row; or where it is cheap in any case.
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
 // Beyond this a joint did not come apart by its own motion: it was pushed, or placed so.
 constexpr double kFastestClosing_m_s = 0.5;
@@ -291,13 +300,12 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
   start_from_last(contact, substep_s);
 }
 
-// Impulses of the previous substep. m_prevRHS, which Bullet does not use, stores its length. The
-// directions of friction follow from the normal: those in the point are Bullet's own, once it has
-// found the point again.
+// Impulses of the previous substep. The directions of friction follow from the normal: those in the
+// point are Bullet's own, once it has found the point again.
 void Solver::start_from_last(ContactRows& contact, double substep_s) {
   const btManifoldPoint& point = *contact.point;
-  if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
-  const double scale = substep_s / point.m_prevRHS;
+  if (!(substep_of(point) > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
+  const double scale = substep_s / substep_of(point);
   contact.normal.give(bodies_, scale * point.m_appliedImpulse);
   contact.along.give(bodies_, scale * point.m_appliedImpulseLateral1);
   contact.across.give(bodies_, scale * point.m_appliedImpulseLateral2);
@@ -596,7 +604,7 @@ void Solver::write_back(double substep_s) {
     point.m_appliedImpulseLateral2 = contact.across.impulse;
     point.m_lateralFrictionDir1 = to_bt(contact.along.linear_a);
     point.m_lateralFrictionDir2 = to_bt(contact.across.linear_a);
-    point.m_prevRHS = substep_s;
+    substep_of(point) = substep_s;
   }
   blocks_.write_back();
   for (size_t i = 1; i < bodies_.size(); ++i) {

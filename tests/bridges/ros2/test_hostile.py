@@ -83,7 +83,7 @@ def test_bytes_that_are_no_message_are_counted(kind, samples):
         output = run.end()
     assert run.process.returncode == 0
     assert f"{len(samples)} messages that came were faulty" in output
-    assert "that are no geometry_msgs/msg/Twist" in output
+    assert "that are not a valid geometry_msgs/msg/Twist" in output
 
 
 def inputs(peer) -> set[tuple[str, str]]:

@@ -101,8 +101,13 @@ export default async function live({
       if (blob.size === data.length) ++count; // the run's own go on
       return createImageBitmap(blob);
     };
+    const source = { kind: "", nameOf: String };
     for (let i = 0; i < 50; ++i)
-      pages.camera("fast", { utime: 0n, width: 1, height: 1, pixelformat: 1196444237, data });
+      pages.camera(
+        "fast",
+        { utime: 0n, width: 1, height: 1, pixelformat: 1196444237, data },
+        source,
+      );
     while (document.querySelector('[data-camera="fast"] canvas').width !== 1)
       await new Promise((next) => requestAnimationFrame(next));
     window.createImageBitmap = createImageBitmap;

@@ -185,6 +185,8 @@ export class Dock {
     if (shape === this.shape) return;
     if (this.shape === "wide") this.wide = this.api.toJSON();
     this.shape = shape;
+    // Of the new size at once: widths that are set in the old one would be cut to it.
+    this.api.layout(this.place.clientWidth, this.place.clientHeight);
     if (shape === "wide" && this.wide) this.restore(this.wide);
     else this.arrange(() => this.usual());
   }

@@ -224,7 +224,7 @@ class Campaign:
         ]
         if len(found) != 1:
             raise SpecError(
-                f"{text} is {'no case' if not found else 'several cases'} of {self.name}: a number from 0 "
+                f"{text} is {'several cases' if found else 'not a case'} of {self.name}: a number from 0 "
                 f"to {len(self.cases) - 1}, or the first 4 digits or more of an id"
             )
         return found[0]
