@@ -85,10 +85,12 @@ int show(const PlayArguments& arguments, double speed) {
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm cannot be used with --view: the page shows the log, and nothing is published");
-  const auto serving = view_log(first.path(), arguments.view, speed, second.path());
-  heed(SIGINT);
-  heed(SIGTERM);
-  signals.reset();
+  const auto ready = [&] {  // whoever reads the address may end it
+    heed(SIGINT);
+    heed(SIGTERM);
+    signals.reset();
+  };
+  const auto serving = view_log(first.path(), arguments.view, speed, second.path(), ready);
   while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
   return kGood;
 }

@@ -102,7 +102,7 @@ std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
 }
 
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed,
-                               const std::string& other) {
+                               const std::string& other, const std::function<void()>& ready) {
   const http::Address where = http::parse_address(address);
   auto source = std::make_unique<console::LogSource>(
       log, [&](const log_header_t& header) { return load_run(header, log); }, speed, other,
@@ -112,6 +112,7 @@ std::shared_ptr<void> view_log(const std::string& log, const std::string& addres
                                                     std::filesystem::path(log).filename().string());
   serving->end("ruedo play has ended.");
   if (!fault.empty()) to_stderr("ruedo: {}: {}\n", log, fault);
+  ready();
   print_urls(*serving);
   return serving;
 }
@@ -161,7 +162,8 @@ std::shared_ptr<void> RunView::open(run::Run&, const std::string&, const std::st
   return nullptr;
 }
 
-std::shared_ptr<void> view_log(const std::string&, const std::string&, double, const std::string&) {
+std::shared_ptr<void> view_log(const std::string&, const std::string&, double, const std::string&,
+                               const std::function<void()>&) {
   no_console();
 }
 

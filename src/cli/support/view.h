@@ -2,6 +2,7 @@
 // missing.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -33,10 +34,11 @@ class RunView {
 };
 
 // Serves the console with a recorded run for as long as the returned object lives, and prints
-// where. speed: log time per real time. other: a log to compare it with; "" for none. Throws
+// where, after a call of ready(). speed: log time per real time. other: a log to compare it with; ""
+// for none. Throws
 // InputError for what is no log, and EnvironmentError as RunView does.
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed,
-                               const std::string& other);
+                               const std::string& other, const std::function<void()>& ready);
 
 // Writes a recorded run as one HTML file that needs no server, of that size at most, and says what
 // is in it. Throws InputError for what is no log or does not fit, and EnvironmentError when the
