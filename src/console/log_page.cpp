@@ -107,9 +107,9 @@ class Writer {
                          64 * index_.channels().size() + 4096;
     const size_t room = most_bytes > fixed ? (most_bytes - fixed) / 4 * 3 : 0;
     if (room <= bytes_.size()) {
-      throw InputError(
-          {log}, fmt::format("its scene alone needs a page of {:.1f} MB",
-                             static_cast<double>(fixed + bytes_.size() / 3 * 4 + 100'000) * 1e-6));
+      const size_t least = fixed + bytes_.size() / 3 * 4 + 100'000;
+      throw InputError({log}, fmt::format("its scene alone needs a page of {:.1f} MB",
+                                          static_cast<double>(least) * 1e-6));
     }
     const bool draws = !scan.drawn().layers().empty();
     const size_t left = (room - bytes_.size()) / 4 * (draws ? 3 : 4);

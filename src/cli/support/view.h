@@ -34,9 +34,8 @@ class RunView {
 };
 
 // Serves the console with a recorded run for as long as the returned object lives, and prints
-// where, after a call of ready(). speed: log time per real time. other: a log to compare it with; ""
-// for none. Throws
-// InputError for what is no log, and EnvironmentError as RunView does.
+// where, after a call of ready(). speed: log time per real time. other: a log to compare it with;
+// "" for none. Throws InputError for what is no log, and EnvironmentError as RunView does.
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed,
                                const std::string& other, const std::function<void()>& ready);
 
