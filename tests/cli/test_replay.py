@@ -96,8 +96,7 @@ def test_plays_at_its_own_time(tmp_path, exchange):
             return [
                 one
                 for one in list(listener.got)
-                if one[0] not in ("mark", "ruedo/info", "ruedo/tick", "ruedo/reply")
-                and not of_nothing(*one)
+                if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)
             ]
 
         until(lambda: len(played()) >= len(first))
@@ -139,7 +138,8 @@ def test_plays_again(tmp_path, exchange, stock):
             return [
                 one
                 for one in list(listener.got)
-                if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)
+                if one[0] not in ("mark", "ruedo/info", "ruedo/tick", "ruedo/reply")  # play's own
+                and not of_nothing(*one)
             ]
 
         until(lambda: len(played()) >= len(wanted))
