@@ -409,7 +409,7 @@ std::string Core::what_is_known(double rate) const {
                 "in lockstep, sim time advances only in step(), whose observations have the "
                 "samples, as in sim.step(20).latest(robot.lrf()); it is at %.2f s",
                 now);
-  const std::string why = why_it_stands([&] { return std::string(text); });
+  std::string why = why_it_stands([&] { return std::string(text); });
   if (!why.empty()) return why;
   if (rate == 0.0) return "it sends when something happens";
   std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate, now);

@@ -59,7 +59,7 @@ void call_for_a_moment() {
       done->set_value();
     }).detach();
     called.wait_for(kLeaveTime);
-  } catch (const std::system_error&) {  // there are too many threads
+  } catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch): too many threads
   }
 }
 

@@ -17,6 +17,11 @@ bool is_of_others(JointMode mode) {
   return mode == JointMode::attached || mode == JointMode::floor || mode == JointMode::open;
 }
 
+NotSupported takes_no_commands(const std::string& kind, const std::string& name,
+                               const std::string& robot) {
+  return NotSupported("the " + kind + " joint " + name + " of " + robot + " takes no commands");
+}
+
 }  // namespace
 
 size_t index_of(const std::vector<std::string>& names, const std::string& joint,
@@ -41,8 +46,7 @@ joint_command_t joint_message(const std::string& robot, const JointLimits& limit
     if (!is_of_others(mode)) {
       const size_t index = index_of(limits.names, name, robot);
       if (!limits.takes_commands.at(index))
-        throw NotSupported("the " + limits.kinds.at(index) + " joint " + name + " of " + robot +
-                           " takes no commands");
+        throw takes_no_commands(limits.kinds.at(index), name, robot);
     }
     command.name.push_back(name);
     command.mode.push_back(static_cast<uint8_t>(mode));

@@ -328,7 +328,7 @@ Driving::~Driving() {
   if (!core_) return;
   try {
     Robot(core_, robot_).stop();
-  } catch (const std::exception&) {  // the simulation was closed, or the robot is gone
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): closed, or the robot is gone
   }
 }
 
