@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -57,6 +58,12 @@ def between(first: Floats, second: Floats, share: float) -> Floats:
     return made
 
 
+def heading_of(orientation: Floats) -> float:
+    """rad, counter-clockwise from the x axis, in (-pi, pi]; of a unit quaternion w, x, y, z."""
+    w, x, y, z = orientation
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
 class Transform:
     """The pose of a frame B in a frame A: takes points of B to A.
 
@@ -97,8 +104,7 @@ class Transform:
     @property
     def heading(self) -> float:
         """rad, counter-clockwise from A's x axis, in (-pi, pi]."""
-        w, x, y, z = self.orientation
-        return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        return heading_of(self.orientation)
 
     def inverse(self) -> Transform:
         """A in B."""

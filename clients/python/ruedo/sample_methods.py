@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from . import notebook
 from .arguments import shown
 from .errors import UnknownName
-from .geometry import Floats, Placed, Transform, between, transformed
+from .geometry import Floats, Placed, Transform, between, heading_of, transformed
 
 if TYPE_CHECKING:
     from .samples import ContactPoint, NavSat, Odometry, Pose
@@ -118,8 +118,7 @@ class PoseMethods:
     @property
     def heading(self) -> float:
         """rad, counter-clockwise from the world's x axis, in (-pi, pi]."""
-        w, x, y, z = self.orientation
-        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return heading_of(self.orientation)
 
 
 _RAW = {

@@ -62,7 +62,7 @@ class Campaign:
             except OSError as error:
                 raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from None
             except UnicodeDecodeError as error:
-                raise SpecError(f"{file}: is not UTF-8: byte {error.start} is none") from None
+                raise SpecError(f"{file}: is not UTF-8: byte {error.start} is invalid") from None
             self._content, self.source = read_yaml(str(file), text)
             self.file, self.folder, stem = file.resolve(), file.resolve().parent, file.stem
         check(self._content, self.source)
