@@ -11,8 +11,10 @@ export default async function fields({ page, until, check, ready, picture }) {
   await page.getByRole("tab", { name: "Channels" }).click();
   const open = async (channel) => {
     await page.getByRole("tab", { name: "Channels" }).click();
-    if (await page.locator(`tr[data-channel="${channel}"] + tr [data-field]`).count()) return;
-    await page.locator(`tr[data-channel="${channel}"]`).click();
+    const row = page.locator(`tr[data-channel="${channel}"]`);
+    await row.waitFor();
+    if (!(await row.locator("+ tr:not([data-channel])").count())) await row.click();
+    await row.locator("+ tr [data-field]").first().waitFor(); // with the next message
   };
   await open("p3at/odometry");
   await page.locator('[data-field="x"]').click();
