@@ -348,5 +348,28 @@ TEST_F(NeverGrowing, ThinThingsStayOnTriangles) {
     expect_no_growth(seed, each);
 }
 
+// Others that other seeds found: cones on boxes that rolled faster and faster or sank by 687 m,
+// corners of boxes that turned into the ground within a substep, a box that rocked on triangles.
+TEST_F(NeverGrowing, FoundByOtherSeeds) {
+  for (const auto& [seed, each] : {std::pair(12u, 74u),
+                                   {18u, 26u},
+                                   {18u, 99u},
+                                   {19u, 105u},
+                                   {26u, 15u},
+                                   {26u, 86u},
+                                   {27u, 58u},
+                                   {30u, 8u},
+                                   {30u, 52u},
+                                   {30u, 67u},
+                                   {32u, 1u},
+                                   {32u, 119u},
+                                   {36u, 34u},
+                                   {37u, 131u},
+                                   {41u, 9u},
+                                   {47u, 130u},
+                                   {59u, 22u}})
+    expect_no_growth(seed, each);
+}
+
 }  // namespace
 }  // namespace ruedo::physics::testing

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "ruedo/math.h"
-
 namespace ruedo::physics {
 
 namespace {
@@ -144,7 +142,7 @@ void Newton::start(const SolverBodies& bodies) {
     contact.missing = Vec3::Zero();
     for (int k = 0; k < 3 && contact.rows[k]; ++k)
       contact.missing[k] = (k == 0 ? 1.0 : contact.friction[k - 1]) * missing(*contact.rows[k]);
-    contact.slip = math::hypot(contact.missing[1], contact.missing[2]);
+    contact.slip = length_of(contact.missing[1], contact.missing[2]);
   }
   y_.assign(matrix_.size(), Six::Zero());
   step_ = y_;
@@ -200,7 +198,7 @@ void Newton::pull(Contact& contact, double part) {
     return;
   }
   const double first = wanted[1], second = wanted[2];
-  const double size = math::hypot(first, second), ratio = contact.weight / contact.weight_t;
+  const double size = length_of(first, second), ratio = contact.weight / contact.weight_t;
   if (size <= load) {
     contact.zone = Zone::sticks;
     contact.pulls = Vec3(load, first, second);
@@ -385,7 +383,7 @@ Newton::Errors Newton::take_multipliers(bool first) {
     if (!contact.rows[1]) continue;
     contact.held.tail<2>() = contact.pulls.tail<2>();
     const Vec3 missing = contact.missing - contact.moves;
-    const double slip = math::hypot(missing[1], missing[2]);
+    const double slip = length_of(missing[1], missing[2]);
     contact.slip_error = slip - contact.slip;
     contact.bears = contact.pulls[0] > 0.0 || missing[0] > slip;
     if (!contact.bears) continue;

@@ -2,11 +2,15 @@
 // velocities, and has the impulse that achieves it.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "physics/base/bullet.h"
 
 namespace ruedo::physics {
+
+// Of a vector in a plane. hypot would cost ten times as much, to allow for parts that are huge.
+inline double length_of(double x, double y) { return std::sqrt(x * x + y * y); }
 
 struct SolverBody {
   btRigidBody* bullet = nullptr;            // null: immovable

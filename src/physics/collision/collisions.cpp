@@ -11,6 +11,7 @@
 #include <BulletCollision/NarrowPhaseCollision/btVoronoiSimplexSolver.h>
 
 #include "physics/collision/closest_points.h"
+#include "physics/collision/contact_points.h"
 #include "physics/collision/convex_shapes.h"
 #include "physics/collision/faces.h"
 
@@ -158,7 +159,7 @@ class ConvexOnPlane final : public Pair {
       const btScalar height = up.dot(at) - ground;
       result.addContactPoint(up, at - height * up, height);
     };
-    add(X_WS * shape.localGetSupportingVertex(-up * X_WS.getBasis()));
+    add(farthest_point(shape, X_WS, -up));
     const Face face = face_towards(shape, X_WS, -up);
     for (size_t i = 0; i < face.count; ++i) add(face.corners[i]);
   }
@@ -217,6 +218,23 @@ bool moves_along_plane(const btCollisionObjectWrapper& box) {
   return body && body->getLinearFactor().z() == 0.0;
 }
 
+// Margins round the edges of boxes and cylinders, which may be nearer by this than closest points.
+double rounded_off(const btConvexShape& shape) {
+  constexpr double kOfACorner = 0.7321;  // sqrt(3) - 1
+  const int type = shape.getShapeType();
+  const bool has_edges = type == BOX_SHAPE_PROXYTYPE || type == CYLINDER_SHAPE_PROXYTYPE;
+  return has_edges ? kOfACorner * shape.getMargin() : 0.0;
+}
+
+// Of the real edges.
+ClosestPoints points_within(double reach, const PlacedShape& a, const PlacedShape& b) {
+  ClosestPoints closest = closest_points(a, b, reach + rounded_off(a.shape) + rounded_off(b.shape));
+  const btVector3& n = closest.normal;
+  if (!n.isZero())
+    closest.distance = n.dot(farthest_point(a.shape, a.X, -n) - farthest_point(b.shape, b.X, n));
+  return closest;
+}
+
 class BoxOnBox final : public Pair {
  public:
   using Pair::Pair;
@@ -233,7 +251,7 @@ class BoxOnBox final : public Pair {
         return PlacedShape{static_cast<const btConvexShape&>(*box.getCollisionShape()),
                            box.getWorldTransform()};
       };
-      const ClosestPoints closest = closest_points(placed(a), placed(b), seen_ahead_m);
+      const ClosestPoints closest = points_within(seen_ahead_m, placed(a), placed(b));
       if (closest.distance > kAhead_m) {
         if (closest.distance <= seen_ahead_m)
           result.addContactPoint(closest.normal, closest.on_b, closest.distance);
@@ -251,10 +269,10 @@ class BoxOnBox final : public Pair {
   }
 };
 
-// The closest points of a convex shape and a triangle of a mesh: Bullet finds none for things of
+// The closest points of two convex shapes, triangles of meshes too: Bullet finds none for things of
 // millimetres. Overlapping shapes have none: then in the direction, of that which Bullet finds and
 // those of their sides, in which they overlap least.
-class ConvexOnTriangle final : public Pair {
+class ConvexOnConvex final : public Pair {
  public:
   using Pair::Pair;
 
@@ -264,20 +282,23 @@ class ConvexOnTriangle final : public Pair {
     const auto& of_a = static_cast<const btConvexShape&>(*a.getCollisionShape());
     const auto& of_b = static_cast<const btConvexShape&>(*b.getCollisionShape());
     const btTransform &X_WA = a.getWorldTransform(), &X_WB = b.getWorldTransform();
-    const ClosestPoints closest = closest_points({of_a, X_WA}, {of_b, X_WB}, seen_ahead_m);
-    if (closest.distance > seen_ahead_m) return;
-    if (!closest.normal.isZero()) {
-      const btScalar gap = closest.normal.dot(closest.on_a - closest.on_b);
-      return result.addContactPoint(closest.normal, closest.on_b, gap);
-    }
+    const double reach = is_driven(*a.getCollisionObject()) || is_driven(*b.getCollisionObject())
+                             ? gContactBreakingThreshold
+                             : seen_ahead_m;
+    const ClosestPoints closest = points_within(reach, {of_a, X_WA}, {of_b, X_WB});
+    if (closest.distance > reach) return;
+    if (!closest.normal.isZero())
+      return result.addContactPoint(closest.normal, closest.on_b, closest.distance);
     Deepest deepest{of_a, of_b, X_WA, X_WB};
     deepest.ask_bullet();
     const btVector3 apart = center_before(a, substep_s) - center_before(b, substep_s);
     for_each_side(of_a, X_WA, -apart, [&](const btVector3& n) { deepest.look(-n); });
     for_each_side(of_b, X_WB, apart, [&](const btVector3& n) { deepest.look(n); });
-    for_each_side(of_b, X_WB, apart, [&](const btVector3& n) {
-      if (n.dot(apart) > 0.0) deepest.prefer(n);
-    });
+    if (of_b.getShapeType() == TRIANGLE_SHAPE_PROXYTYPE) {
+      for_each_side(of_b, X_WB, apart, [&](const btVector3& n) {
+        if (n.dot(apart) > 0.0) deepest.prefer(n);
+      });
+    }
     result.addContactPoint(deepest.normal, deepest.on_b, deepest.gap);
   }
 
@@ -291,8 +312,8 @@ class ConvexOnTriangle final : public Pair {
             const btTransform& of_b)
         : a(shape_a), b(shape_b), X_WA(of_a), X_WB(of_b) {}
     void look(const btVector3& n) {
-      const btVector3 on_a = X_WA * a.localGetSupportingVertex(-n * X_WA.getBasis());
-      const btScalar here = n.dot(on_a - X_WB * b.localGetSupportingVertex(n * X_WB.getBasis()));
+      const btVector3 on_a = farthest_point(a, X_WA, -n);
+      const btScalar here = n.dot(on_a - farthest_point(b, X_WB, n));
       if (here <= gap) return;
       normal = n;
       on_b = on_a - here * n;
@@ -342,7 +363,7 @@ void register_collisions(btCollisionDispatcher& dispatcher) {
   static Create<OnPlane<true, false>> plane_cylinder;
   static Create<ConvexOnPlane<false>> convex_plane;
   static Create<ConvexOnPlane<true>> plane_convex;
-  static Create<ConvexOnTriangle> convex_triangle;
+  static Create<ConvexOnConvex> convex_convex;
   static Create<BoxOnBox> box_box;
   const auto set = [&](int a, int b, btCollisionAlgorithmCreateFunc& create) {
     dispatcher.registerCollisionCreateFunc(a, b, &create);
@@ -356,11 +377,12 @@ void register_collisions(btCollisionDispatcher& dispatcher) {
     set(convex, STATIC_PLANE_PROXYTYPE, convex_plane);
     set(STATIC_PLANE_PROXYTYPE, convex, plane_convex);
   }
-  for (const int convex :
-       {BOX_SHAPE_PROXYTYPE, CYLINDER_SHAPE_PROXYTYPE, CAPSULE_SHAPE_PROXYTYPE,
-        CONE_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, CUSTOM_CONVEX_SHAPE_TYPE}) {
-    set(convex, TRIANGLE_SHAPE_PROXYTYPE, convex_triangle);
-    set(TRIANGLE_SHAPE_PROXYTYPE, convex, convex_triangle);
+  constexpr std::array kConvex{BOX_SHAPE_PROXYTYPE,         CYLINDER_SHAPE_PROXYTYPE,
+                               CAPSULE_SHAPE_PROXYTYPE,     CONE_SHAPE_PROXYTYPE,
+                               CONVEX_HULL_SHAPE_PROXYTYPE, CUSTOM_CONVEX_SHAPE_TYPE,
+                               TRIANGLE_SHAPE_PROXYTYPE};
+  for (const int a : kConvex) {
+    for (const int b : kConvex) set(a, b, convex_convex);
   }
   set(BOX_SHAPE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, box_box);
 }

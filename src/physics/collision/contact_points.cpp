@@ -66,17 +66,17 @@ void choose(Found* points, size_t to, size_t count, Of&& of) {
   std::rotate(points + to, points + best, points + best + 1);
 }
 
-// Puts those four first that enclose the most of what may touch in this substep, among them the
-// lowest. Where fewer than four are as low as that, these, and of the others those far from them.
+// Puts those four first that enclose the most of what may touch in this substep, among them those
+// that would be lowest at its end. Where fewer than four are as low as that, these, and of the
+// others those far from them.
 void choose_four(Found* points, size_t count, btScalar level) {
-  std::stable_sort(points, points + count, [](const Found& a, const Found& b) {
-    return a.point.m_distance1 < b.point.m_distance1;
-  });
-  const btScalar lowest = points[0].point.m_distance1;
+  std::stable_sort(points, points + count,
+                   [](const Found& a, const Found& b) { return a.gap_then < b.gap_then; });
+  const btScalar lowest = points[0].gap_then;
   const auto below = [&](btScalar height) {
     return static_cast<size_t>(
         std::find_if(points, points + count,
-                     [&](const Found& found) { return found.point.m_distance1 > height; }) -
+                     [&](const Found& found) { return found.gap_then > height; }) -
         points);
   };
   const size_t low = below(lowest + level), near = below(lowest + level + seen_ahead_m);
@@ -170,10 +170,6 @@ btScalar swing_of(const btCollisionObject& object) {
   return body ? body->getAngularVelocity().length() * body->getCcdSweptSphereRadius() : 0.0;
 }
 
-// What a kinematic drive moves only touches what it overlaps, and keeps Bullet's points while it
-// passes over edges: they are its ground. The world marks it so.
-bool is_driven(const btCollisionObject& object) { return object.getHitFraction() == 0.0; }
-
 btScalar weight_of(const btCollisionObject& object) {  // m/s^2
   const auto* body = btRigidBody::upcast(&object);
   return body ? body->getGravity().length() : 0.0;
@@ -211,7 +207,16 @@ struct ContactPoints::Placed {
     if (face.count == 2) face = face_towards(shape, X, direction);
   }
   btVector3 farthest(const btVector3& direction) const {
-    return X * shape.localGetSupportingVertex(direction * X.getBasis());
+    return farthest_point(shape, X, direction);
+  }
+  // The shape's pose after a time at that velocity of its body, which goes on turning.
+  btTransform moved(const btVector3& velocity, btScalar seconds) const {
+    const auto* body = btRigidBody::upcast(&object);
+    if (!body) return X;
+    btTransform of_body;
+    btTransformUtil::integrateTransform(body->getWorldTransform(), velocity,
+                                        body->getAngularVelocity(), seconds, of_body);
+    return of_body * body->getWorldTransform().inverseTimes(X);
   }
 };
 
@@ -266,25 +271,39 @@ bool ContactPoints::find_above_triangle(const Placed& a, const Placed& b, Touch&
 }
 
 // Conservative advancement (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems",
-// 1996) along the straight way.
+// 1996).
 bool ContactPoints::meet_later(const Placed& a, const Placed& b, Touch& touch) const {
-  constexpr btScalar kMet_m = 1e-4;
-  constexpr int kMostRounds = 50;
-  const btVector3 way = (velocity_of(a.object) - velocity_of(b.object)) * scratch_.substep_s;
-  btTransform X = a.X;
-  btScalar part = 0.0;
+  constexpr double kMet_m = 1e-4;
+  constexpr int kMostRounds = 100;
+  const btVector3 v = velocity_of(a.object) - velocity_of(b.object);
+  const btScalar swing = swing_of(a.object) + swing_of(b.object);
+  btTransform X_a = a.X, X_b = b.X;
+  btScalar after_s = 0.0;
   for (int round = 0; round < kMostRounds; ++round) {
-    const ClosestPoints closest = closest_points({a.shape, X}, {b.shape, b.X}, BT_LARGE_FLOAT);
-    if (closest.normal.isZero()) return false;
-    const btScalar nearer = -way.dot(closest.normal);
+    const ClosestPoints closest = closest_points({a.shape, X_a}, {b.shape, X_b}, BT_LARGE_FLOAT);
+    const btVector3& n = closest.normal;
+    if (n.isZero()) return false;
     if (closest.distance <= kMet_m) {
-      touch = {closest.normal, closest.on_b, closest.distance + part * nearer, false};
-      return nearer > 0.0;
+      // What touches then, where it is now.
+      const auto now = [&](const btVector3& on_b, btScalar gap) {
+        const btVector3 b_now = b.X * X_b.invXform(on_b),
+                        a_now = a.X * X_a.invXform(on_b + gap * n);
+        return TouchingPoint{b_now, n.dot(a_now - b_now)};
+      };
+      const btScalar gap =
+          n.dot(farthest_point(a.shape, X_a, -n) - farthest_point(b.shape, X_b, n));
+      const TouchingPoint first = now(closest.on_b, gap);
+      touch = {n, first.on_b, first.gap, false};
+      overlap(face_towards(a.shape, X_a, -n), face_towards(b.shape, X_b, n), n, scratch_.touching);
+      for (TouchingPoint& each : scratch_.touching) each = now(each.on_b, each.gap);
+      return true;
     }
+    const btScalar nearer = swing - v.dot(n);
     if (nearer <= 0.0) return false;
-    part += closest.distance / nearer;
-    if (part > 1.0) return false;
-    X.setOrigin(a.X.getOrigin() + part * way);
+    after_s += closest.distance / nearer;
+    if (after_s > scratch_.substep_s) return false;
+    X_a = a.moved(v, after_s);
+    X_b = b.moved({0, 0, 0}, after_s);
   }
   return false;
 }
@@ -321,7 +340,7 @@ void ContactPoints::addContactPoint(const btVector3& normal_on_b, const btVector
     if (!meet_later({a, -normal_on_b}, {b, normal_on_b}, touch)) return;
   }
   if (!touch.of_a_side && !belongs(touch.normal, touch.on_b, touch.gap) &&
-      !(touch.gap > 0.0 && b.getCollisionShape()->isConvex() &&
+      !(b.getCollisionShape()->isConvex() &&
         find_above_triangle({a, -normal_on_b}, {b, normal_on_b}, touch)))
     return;
   bool first = false;  // whether the closest point is among them
@@ -348,7 +367,16 @@ void ContactPoints::add(const btVector3& normal_on_b, const btVector3& point_on_
   point.m_index1 = swapped ? m_index0 : m_index1;
   point.m_partId0 = swapped ? m_partId1 : m_partId0;
   point.m_partId1 = swapped ? m_partId0 : m_partId1;
-  scratch_.found.push_back({m_manifoldPtr, point});
+  const auto velocity = [&](const btCollisionObject& object, const btVector3& at) {
+    const auto* body = btRigidBody::upcast(&object);
+    return body ? body->getVelocityInLocalPoint(at - body->getCenterOfMassPosition())
+                : btVector3(0, 0, 0);
+  };
+  const btVector3 opening =
+      velocity(*(swapped ? m_body1Wrap : m_body0Wrap)->getCollisionObject(), point_on_a) -
+      velocity(*(swapped ? m_body0Wrap : m_body1Wrap)->getCollisionObject(), point_on_b);
+  scratch_.found.push_back(
+      {m_manifoldPtr, point, gap + scratch_.substep_s * opening.dot(normal_on_b)});
 }
 
 void ContactPoints::finish(btCollisionAlgorithm& algorithm) {

@@ -13,6 +13,10 @@
 
 namespace ruedo::physics {
 
+// What a kinematic drive moves only touches what it overlaps, and keeps Bullet's points while it
+// passes over edges: they are its ground. The world marks it so.
+inline bool is_driven(const btCollisionObject& object) { return object.getHitFraction() == 0.0; }
+
 class ContactPoints : public btManifoldResult {
  public:
   // Reused, so that contacts do not allocate.
@@ -20,6 +24,7 @@ class ContactPoints : public btManifoldResult {
     struct Found {
       btPersistentManifold* manifold;
       btManifoldPoint point;
+      btScalar gap_then;  // at the end of the substep, at the present velocities
     };
     std::vector<Found> found;
     std::vector<TouchingPoint> touching;

@@ -184,6 +184,18 @@ Face face_towards(const btCollisionShape& shape, const btTransform& X, const btV
   return face;
 }
 
+btVector3 farthest_point(const btConvexShape& shape, const btTransform& X,
+                         const btVector3& direction) {
+  const btVector3 d = direction * X.getBasis();
+  if (shape.getShapeType() != CYLINDER_SHAPE_PROXYTYPE)
+    return X * shape.localGetSupportingVertex(d);
+  const auto& cylinder = static_cast<const btCylinderShape&>(shape);
+  btVector3 point = cylinder.getRadius() * across_z(d);
+  const btScalar half = cylinder.getHalfExtentsWithMargin().z();
+  point.setZ(d.z() < 0.0 ? -half : half);
+  return X * point;
+}
+
 btVector3 center_before(const btCollisionObjectWrapper& placed, btScalar substep_s) {
   const btCollisionShape& shape = *placed.getCollisionShape();
   const btTransform& X = placed.getWorldTransform();

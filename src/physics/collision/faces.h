@@ -27,6 +27,11 @@ struct Face {
 // What lies farthest in that direction (unit, world); X is the shape's pose. Triangles, too.
 Face face_towards(const btCollisionShape& shape, const btTransform& X, const btVector3& direction);
 
+// The point that lies farthest in that direction (unit, world). Bullet's own rounds a cylinder's
+// edges by its margin.
+btVector3 farthest_point(const btConvexShape& shape, const btTransform& X,
+                         const btVector3& direction);
+
 // A point of the shape a substep ago: a triangle's corner, or the centre of a moving shape. It
 // tells on which side of a surface the shape is, also when it sank into that in the last substep.
 btVector3 center_before(const btCollisionObjectWrapper& placed, btScalar substep_s);

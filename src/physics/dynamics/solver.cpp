@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ruedo/math.h"
 #include "ruedo/quantity.h"
 
 namespace ruedo::physics {
@@ -249,7 +248,7 @@ void Solver::set_friction(ContactRows& contact, const ContactSurface& surface) {
   const double k11 = m1 * m1 * (contact.along.response + surface.slip),
                k22 = m2 * m2 * (contact.across.response + surface.slip2);
   const double k12 = m1 * m2 * contact.along.coupling(contact.across);
-  const double largest = 0.5 * (k11 + k22) + math::hypot(0.5 * (k11 - k22), k12);
+  const double largest = 0.5 * (k11 + k22) + length_of(0.5 * (k11 - k22), k12);
   contact.step = largest > 1e-12 ? 1.0 / largest : 0.0;
 }
 
@@ -340,7 +339,7 @@ double Solver::rub(ContactRows& contact) {
   if (!inside) {
     double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1,
            s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
-    const double size = math::hypot(s1, s2);
+    const double size = length_of(s1, s2);
     if (size > load) {
       s1 *= load / size;
       s2 *= load / size;
