@@ -81,3 +81,26 @@ def test_monte_carlo_localisation_finds_the_robot():
 
     errors = localisation.localise()
     assert errors[0] > 0.3 and max(errors[-10:]) < 0.1
+
+
+def test_a_patrol_drives_home_before_its_battery_is_empty():
+    """Of 20 kJ at 1 kJ/m: at the third post 8 are left, and to the first and home are 9.66 m."""
+    import patrol
+
+    visits, least = patrol.patrol()
+    posts = patrol.POSTS
+    assert [place for place, _ in visits] == [*posts, patrol.HOME, *posts]
+    expected = [16.0, 12.0, 8.0, 4.0, 16.0, 12.0, 8.0]
+    assert [charge for _, charge in visits] == pytest.approx(expected, abs=0.05)
+    assert least == pytest.approx(4.0, abs=0.05)
+
+
+def test_a_potential_field_leads_between_pillars():
+    """The straight way touches the first of them: its edge is 0.15 m off, the robot 0.25."""
+    import potential_field
+
+    way, touched = potential_field.drive()
+    assert touched == set() and math.dist(way[-1], potential_field.GOAL) < 0.2
+    assert max(abs(way[:, 1])) > 0.1
+    away = [np.hypot(*(way - place).T).min() for place in potential_field.PILLARS]
+    assert min(away) > 0.25 + 0.1
