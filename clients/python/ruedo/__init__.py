@@ -94,7 +94,7 @@ def __dir__() -> list[str]:
     return sorted([*__all__, "__version__"])
 
 
-def __getattr__(name: str) -> object:
+def _late(name: str) -> object:
     """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
     it is first asked for.
     """
@@ -110,6 +110,10 @@ def __getattr__(name: str) -> object:
             f"and newer, and with a build of Ruedo, for the Python that built it ({error})"
         ) from error
     return getattr(engine, name)
+
+
+if not TYPE_CHECKING:  # else checkers take any name for one of the package's
+    __getattr__ = _late
 
 
 __all__ = [

@@ -3,7 +3,7 @@
     from ruedo.fit import read
 
     recording = read("drive.log.gz")
-    print(recording.truth.length_m())
+    print(recording.kind, recording.findings)
 
 The commands `ruedo fit` and `ruedo import` (docs/fit.md) use it. Needs `pip install 'ruedo[fit]'`.
 """

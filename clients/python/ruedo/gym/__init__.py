@@ -18,6 +18,7 @@ tasks of your own (docs/tasks.md).
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 try:
     import gymnasium
@@ -69,15 +70,21 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    """``FleetEnv`` needs PettingZoo, which the others do not."""
-    if name != "FleetEnv":
-        raise AttributeError(f"module 'ruedo.gym' has no attribute {name!r}")
-    try:
-        from .fleet import FleetEnv
-    except ImportError as error:
-        raise ImportError("ruedo.gym.FleetEnv needs PettingZoo: pip install pettingzoo") from error
-    return FleetEnv
+if TYPE_CHECKING:
+    from .fleet import FleetEnv as FleetEnv
+else:
+
+    def __getattr__(name: str) -> object:
+        """``FleetEnv`` needs PettingZoo, which the others do not."""
+        if name != "FleetEnv":
+            raise AttributeError(f"module 'ruedo.gym' has no attribute {name!r}")
+        try:
+            from .fleet import FleetEnv
+        except ImportError as error:
+            raise ImportError(
+                "ruedo.gym.FleetEnv needs PettingZoo: pip install pettingzoo"
+            ) from error
+        return FleetEnv
 
 
 def register(name: str, task: type[Task]) -> None:
