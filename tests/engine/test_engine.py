@@ -499,7 +499,7 @@ def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
     e = ruedo.Engine(
         "arena",
         spawn=["p3at:guest@1,1"],
-        set={"p3at/lrf.update_rate": 10},
+        settings={"p3at/lrf.update_rate": 10},
         disable=["p3at/camera", "guest/camera"],
     )
     assert e.robots == ("p3at", "guest") and "2 " not in repr(e)

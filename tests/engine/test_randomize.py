@@ -102,7 +102,9 @@ def test_settings_are_as_with_set():
         **ARENA, seed=3, randomize={"p3at/lrf.lidar.range.max": "uniform(2, 3)"}
     ) as drawn:
         limit = drawn.drawn()["p3at/lrf.lidar.range.max"]
-        with ruedo.Engine(**ARENA, seed=3, set={"p3at/lrf.lidar.range.max": repr(limit)}) as told:
+        with ruedo.Engine(
+            **ARENA, seed=3, settings={"p3at/lrf.lidar.range.max": repr(limit)}
+        ) as told:
             assert np.array_equal(drawn.observe("lrf.ranges"), told.observe("lrf.ranges"))
 
 

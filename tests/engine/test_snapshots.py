@@ -150,7 +150,7 @@ def test_threads_and_cores_change_nothing():
 
 def test_a_picture_that_nobody_read_when_it_was_saved_is_the_one_that_was_due():
     def driven():
-        engine = ruedo.Engine("arena", seed=2, set={"p3at/camera.ruedo:encoding": "rgb"})
+        engine = ruedo.Engine("arena", seed=2, settings={"p3at/camera.ruedo:encoding": "rgb"})
         engine.step(np.full((1, 1, 2), [0.3, 0.5]), 150)
         return engine
 

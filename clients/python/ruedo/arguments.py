@@ -9,7 +9,7 @@ import math
 import operator
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -144,6 +144,28 @@ def finite(what: str, value: Any, low: float = -math.inf) -> float:
     return given
 
 
+def check_known(
+    what: str, given: Iterable[str], calls: Sequence[Callable[..., Any]], also: Iterable[str]
+) -> None:
+    """Raises TypeError, with a suggestion, for an option that is neither one of these calls', which
+    pass on to the next what they do not know, nor among the others. The last call may take any.
+    """
+    listed = [list(inspect.signature(call).parameters.values()) for call in calls]
+    if listed and any(one.kind == one.VAR_KEYWORD for one in listed[-1]):
+        return
+    named = [one for parameters in listed for one in parameters if one.kind != one.VAR_KEYWORD]
+    allowed = list(dict.fromkeys([*(one.name for one in named if one.name != "self"), *also]))
+    for name in given:
+        if name not in allowed:
+            raise unknown_option(what, name, allowed)
+
+
+def unknown_option(what: str, name: str, allowed: list[str]) -> TypeError:
+    near = difflib.get_close_matches(name, allowed, 1)
+    hint = f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
+    return TypeError(f"{what}() has no option {name}{hint}")
+
+
 def options(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A call that raises a TypeError with a suggestion for an option that it does not have.
 
@@ -159,11 +181,7 @@ def options(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
             for old in [name for name in named if name not in allowed]:
                 now = renamed.get(old)
                 if now is None or now in named:
-                    near = difflib.get_close_matches(old, allowed, 1)
-                    hint = (
-                        f": did you mean {near[0]}?" if near else f"; it has {', '.join(allowed)}"
-                    )
-                    raise TypeError(f"{what}() has no option {old}{hint}")
+                    raise unknown_option(what, old, allowed)
                 warnings.warn(
                     f"{what}({old}=...) is deprecated: it is {now}",
                     DeprecationWarning,

@@ -70,6 +70,11 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    """What users should see."""
+    return sorted(__all__)
+
+
 if TYPE_CHECKING:
     from .fleet import FleetEnv as FleetEnv
 else:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import os
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -19,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..arguments import named, shown, texts, whole
+from ..arguments import check_known, named, shown, texts, whole
 from ..engine import MOST_WORLDS, Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, Scene
 from ..world import World
@@ -64,6 +65,11 @@ class SavedEpisodes(Saved):
         return f"<ruedo.gym.SavedEpisodes: {len(self)}>"
 
 
+# Of `TaskVectorEnv`, for suggestions.
+_OPTIONS = ("num_envs", "split", "noise", "threads", "randomize", "settings", "disable")
+_OPTIONS += ("max_episode_steps", "autoreset_mode", "render_mode")
+
+
 class MadeAnew:
     """Copied or pickled, an environment is made anew with the same arguments, as by Gymnasium's
     EzPickle; it needs a reset().
@@ -92,8 +98,8 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
 
     task: a subclass of `Task`. Options that are not listed here go to its constructor. split: which
     scenes, "train" or "test"; no scene is in both. noise: False gives ideal sensors. threads: at
-    most so many cores, 0 for all. randomize, set and disable: as those of `ruedo.Engine`; what was
-    drawn is in ``info["drawn"]`` when an episode begins. max_episode_steps: actions until an
+    most so many cores, 0 for all. randomize, settings and disable: as those of `ruedo.Engine`; what
+    was drawn is in ``info["drawn"]`` when an episode begins. max_episode_steps: actions until an
     episode is truncated; None: the task's own number, -1: never.
     """
 
@@ -112,7 +118,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         noise: bool = True,
         threads: int = 0,
         randomize: dict[str, str] | None = None,
-        set: Mapping[str, object] | None = None,
+        settings: Mapping[str, object] | None = None,
         disable: Iterable[str] = (),
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -130,6 +136,11 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             )
         if render_mode == "human" and num_envs != 1:
             raise ValueError("render_mode 'human' is for one environment: the console shows one")
+        if "set" in options:
+            warnings.warn("set is deprecated: it is settings", DeprecationWarning, stacklevel=2)
+            settings = options.pop("set")
+        inits = [one.__init__ for one in task.__mro__[:-1] if "__init__" in vars(one)]
+        check_known(task.__name__, options, inits, _OPTIONS)
         self.task = task(**options)
         limit = self.task.max_episode_steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = whole("max_episode_steps", limit, -1)
@@ -141,7 +152,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._options: Info = {
             "settings": {
                 **self.task.settings,
-                **named("set", set, '{"robot/lrf.update_rate": 10}'),
+                **named("settings", settings, '{"robot/lrf.update_rate": 10}'),
             },
             "disable": [*self.task.disable, *texts("disable", disable)],
             "noise": noise,

@@ -9,6 +9,7 @@ stands where it is, seen by the others. ``infos[robot]`` has ``success`` and ``c
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import gymnasium
@@ -17,7 +18,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore]
 
-from ..arguments import whole
+from ..arguments import named, whole
 from ..engine import Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, make_fleet_room
 from .drive import GOAL_M, MOST_SPEED, goal_term
@@ -50,7 +51,7 @@ class SavedFleet(Saved):
 
 
 class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
-    """``robots`` of them, called robot0, robot1, ..."""
+    """``robots`` of them, called robot0, robot1, ... settings: as those of `ruedo.Engine`."""
 
     metadata: ClassVar[Each] = {
         "name": "ruedo_fleet_v0",
@@ -66,6 +67,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         beams: int = 24,
         split: Literal["train", "test"] = "train",
         noise: bool = True,
+        settings: Mapping[str, object] | None = None,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         robots = whole("robots", robots, 1, 32)
@@ -94,7 +96,11 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
             text=self._text(0),
             noise=noise,
             settings={
-                f"{name}/lrf.lidar.scan.horizontal.samples": beams for name in self.possible_agents
+                **{
+                    f"{name}/lrf.lidar.scan.horizontal.samples": beams
+                    for name in self.possible_agents
+                },
+                **named("settings", settings, '{"robot0/lrf.update_rate": 10}'),
             },
             disable=[
                 f"{name}/{device}"
