@@ -49,6 +49,31 @@ def test_what_is_seen_has_documentation():
     assert "step_size" in pydoc.render_doc(ruedo.Engine)
 
 
+def test_each_method_has_documentation_and_plain_names():
+    """No parameter hides one of Python's own: `type`, `set`, `id`."""
+    for name in dir(ruedo):
+        kind = getattr(ruedo, name)
+        if not inspect.isclass(kind) or issubclass(kind, (Exception, str)):
+            continue
+        for attribute, thing in inspect.getmembers_static(kind):
+            of = getattr(thing, "__func__", thing)  # of static methods and those of classes
+            if attribute.startswith("_") or not (
+                inspect.isfunction(of) or isinstance(of, property)
+            ):
+                continue
+            assert inspect.getdoc(of), f"{name}.{attribute}"
+            if inspect.isfunction(of):
+                taken = {"type", "set", "id"} & set(inspect.signature(of).parameters)
+                assert not taken, f"{name}.{attribute}"
+
+
+def test_dir_of_the_environments_has_no_modules():
+    import ruedo.gym
+
+    assert "FleetEnv" in dir(ruedo.gym) and "NavigateEnv" in dir(ruedo.gym)
+    assert not [name for name in dir(ruedo.gym) if inspect.ismodule(getattr(ruedo.gym, name))]
+
+
 def snippets(folder):
     files = []
     for page in PAGES:

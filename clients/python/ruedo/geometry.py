@@ -91,14 +91,17 @@ class Transform:
 
     @property
     def x(self) -> float:
+        """m."""
         return float(self.position[0])
 
     @property
     def y(self) -> float:
+        """m."""
         return float(self.position[1])
 
     @property
     def z(self) -> float:
+        """m."""
         return float(self.position[2])
 
     @property

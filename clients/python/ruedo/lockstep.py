@@ -102,6 +102,7 @@ class Observations(State):
 
     @property
     def messages(self) -> list[Message]:
+        """Those of its steps, in the order in which the simulation made them."""
         made: list[Message] | None = self.__dict__.get("_messages")
         if made is None:
             made = [Message(step, *one) for step, came in self._steps for one in came]

@@ -109,10 +109,12 @@ class PoseMethods:
 
     @property
     def x(self) -> float:
+        """m."""
         return float(self.position[0])
 
     @property
     def y(self) -> float:
+        """m."""
         return float(self.position[1])
 
     @property

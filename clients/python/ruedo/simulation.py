@@ -87,10 +87,12 @@ class Simulation(Requests):
 
     @property
     def world(self) -> str:
+        """Its name."""
         return self._info.world
 
     @property
     def seed(self) -> int:
+        """The run's."""
         return self._info.seed
 
     @property
