@@ -1,6 +1,6 @@
 """Nav2 and slam_toolbox beside a run, by the launch files and parameters of ruedo_ros.
 
-At half of real time, on two cores. The referee is the true pose.
+At real time or less, on two cores: each robot has a Nav2 of its own. The referee is the true pose.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ def parameters(folder, *robot, controller=RPP, planner=NAVFN):
     nodes = yaml.safe_load(of_ruedo("nav2-params", *robot))
     nodes["controller_server"]["ros__parameters"]["FollowPath"].update(controller)
     nodes["planner_server"] = {"ros__parameters": {"GridBased": planner}}
+    patience = {"default_server_timeout": 20000, "wait_for_service_timeout": 60000}  # ms, real time
+    nodes["bt_navigator"] = {"ros__parameters": patience}
     file = folder / f"{robot[-1]}.yaml"
     file.write_text(yaml.safe_dump(nodes))
     return file
@@ -79,6 +81,7 @@ def script(ros, name, *words):
     return subprocess.Popen(
         [sys.executable, HERE / name, *map(str, words)],
         env=ros.environment,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -96,8 +99,8 @@ def answer(process):
     return json.loads(lines[-1])
 
 
-def arrived(goals):
-    return all(goal["reached"] and goal["off_m"] <= TOLERANCE_M for goal in goals)
+def arrived(goals, tolerance_m=TOLERANCE_M):
+    return all(goal["reached"] and goal["off_m"] <= tolerance_m for goal in goals)
 
 
 @needs(*OF_NAV2)
@@ -108,6 +111,70 @@ def test_goals_are_reached(tmp_path):
         ros = Ros(run, MIDDLEWARES[0])
         with launched(ros, tmp_path / "nav2.log", *words, f"robot:={robot}", "rviz:=False"):
             assert arrived(answer(script(ros, "navigate.py", "", [[-3.5, 0.0], [-1.0, -3.8]])))
+
+
+def merged(base, over):
+    both = {**base, **over}
+    for name in base.keys() & over.keys():
+        if isinstance(base[name], dict) and isinstance(over[name], dict):
+            both[name] = merged(base[name], over[name])
+    return both
+
+
+def of_servers(folder, world, *robot):
+    """Parameters for servers.launch.py, in which the tree plans once."""
+    share = {
+        name: Path(get_package_share_directory(f"nav2_{name}"))
+        for name in ("bringup", "bt_navigator")
+    }
+    nodes = yaml.safe_load((share["bringup"] / "params/nav2_params.yaml").read_text())
+    nodes = merged(nodes, yaml.safe_load(parameters(folder, *robot).read_text()))
+    nodes["map_server"] = {"ros__parameters": {"yaml_filename": str(map_of(world, folder))}}
+    tree = (
+        share["bt_navigator"] / "behavior_trees/navigate_w_replanning_only_if_goal_is_updated.xml"
+    )
+    navigator = nodes["bt_navigator"]["ros__parameters"]
+    navigator |= {"navigators": ["navigate_to_pose"], "default_nav_to_pose_bt_xml": str(tree)}
+    for costmap in ("local_costmap", "global_costmap"):
+        nodes[costmap][costmap]["ros__parameters"].pop("robot_radius", None)
+    return nodes
+
+
+def written(nodes, file):
+    file.write_text(yaml.safe_dump(nodes))
+    return file
+
+
+FLEET = SOURCE / "worlds/fleet.sdf"
+ACROSS = {"alice": [[-6.0, 4.0]], "bob": [[-6.0, -4.5]], "carol": [[6.0, 4.5]]}
+
+
+@needs(*OF_NAV2)
+def test_three_robots_navigate_at_once(tmp_path):
+    remaps = [
+        word for name in ACROSS for word in ("--remap", f"/{name}/initialpose=/{name}/set_pose")
+    ]
+    words = ["--rate", "0.2", "--ros2-tf", "namespaced", *remaps]
+    with Run(*words, world=FLEET, lcm="memq://") as run:
+        ros = Ros(run, MIDDLEWARES[0])
+        with contextlib.ExitStack() as stack:
+            ready = []
+            for name in ACROSS:
+                nodes = of_servers(tmp_path, FLEET, FLEET, "--robot", name)
+                controller = nodes["controller_server"]["ros__parameters"]
+                controller["controller_frequency"] = 5.0  # of real time
+                file = written(nodes, tmp_path / f"{name}.servers.yaml")
+                words = [HERE / "servers.launch.py", f"namespace:={name}", f"params_file:={file}"]
+                stack.enter_context(launched(ros, tmp_path / f"{name}.log", *words))
+                ready.append(script(ros, "navigate.py", name, ACROSS[name]))
+                stack.callback(ready[-1].kill)
+                assert ready[-1].stdout.readline() == "active\n"
+            for process in ready:
+                process.stdin.write("go\n")
+                process.stdin.flush()
+            # Each AMCL also sees the other robots, which are in no map.
+            goals = [answer(process) for process in ready]
+            assert all(arrived(each, TOLERANCE_M + 0.1) for each in goals)
 
 
 ROUTES = {
@@ -136,41 +203,29 @@ def test_slam_gives_the_true_map(tmp_path, world):
     assert found["off_m"] <= 0.1
 
 
-def merged(base, over):
-    both = {**base, **over}
-    for name in base.keys() & over.keys():
-        if isinstance(base[name], dict) and isinstance(over[name], dict):
-            both[name] = merged(base[name], over[name])
-    return both
+@needs("slam_toolbox", *OF_NAV2)
+def test_goals_are_reached_while_slam_maps(tmp_path):
+    robot = parameters(tmp_path, "p3at")
+    words = ["ruedo_ros", "nav2.launch.py", "slam:=True", f"robot:={robot}", "rviz:=False"]
+    words += PROCESSES
+    with Run("--rate", "0.5", lcm="memq://") as run:
+        ros = Ros(run, MIDDLEWARES[0])
+        with launched(ros, tmp_path / "nav2.log", *words):
+            goals = [[1.0, 3.7], [-2.0, 4.0]]  # each in the map that there is by then
+            assert arrived(answer(script(ros, "navigate.py", "--slam", "", goals)))
 
 
 def of_lockstep(folder, wall_hz=100, run_hz=20):
-    """Parameters for lockstep.launch.py: the controller looks wall_hz times a second of real time
-    whether the run has gone on by 1 / run_hz, and plans once."""
-    share = {
-        name: Path(get_package_share_directory(f"nav2_{name}"))
-        for name in ("bringup", "bt_navigator")
-    }
-    nodes = yaml.safe_load((share["bringup"] / "params/nav2_params.yaml").read_text())
-    nodes = merged(nodes, yaml.safe_load(parameters(folder, "p3at").read_text()))
-    nodes["map_server"] = {"ros__parameters": {"yaml_filename": str(map_of("arena", folder))}}
-    tree = (
-        share["bt_navigator"] / "behavior_trees/navigate_w_replanning_only_if_goal_is_updated.xml"
-    )
-    navigator = nodes["bt_navigator"]["ros__parameters"]
-    navigator |= {"navigators": ["navigate_to_pose"], "default_nav_to_pose_bt_xml": str(tree)}
-    navigator |= {"default_server_timeout": 20000}  # ms of real time: a busy machine is no failure
+    """Parameters for servers.launch.py: the controller looks wall_hz times a second of real time
+    whether the run has gone on by 1 / run_hz."""
+    nodes = of_servers(folder, "arena", "p3at")
     controller = nodes["controller_server"]["ros__parameters"]
     controller |= {"controller_frequency": float(wall_hz), "enable_stamped_cmd_vel": True}
     # RPP takes the wall's period for that between two of its commands.
     controller["FollowPath"]["max_angular_accel"] *= wall_hz / run_hz
     # The costmap is updated by the wall's clock: no speed may depend on it.
     controller["FollowPath"]["use_cost_regulated_linear_velocity_scaling"] = False
-    for costmap in ("local_costmap", "global_costmap"):
-        nodes[costmap][costmap]["ros__parameters"].pop("robot_radius", None)
-    file = folder / "lockstep.yaml"
-    file.write_text(yaml.safe_dump(nodes))
-    return file
+    return written(nodes, folder / "lockstep.yaml")
 
 
 def lockstep(folder, load):
@@ -188,7 +243,9 @@ def lockstep(folder, load):
             busy = stack.enter_context(subprocess.Popen([sys.executable, "-c", "while True: pass"]))
             stack.callback(busy.kill)
         stack.enter_context(
-            launched(ros, folder / "nav2.log", HERE / "lockstep.launch.py", settings)
+            launched(
+                ros, folder / "nav2.log", HERE / "servers.launch.py", settings, "localize:=False"
+            )
         )
         going = script(ros, "lockstep.py", -3.5, 0.0)
         stack.callback(going.kill)
