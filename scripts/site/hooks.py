@@ -92,7 +92,7 @@ def on_page_markdown(markdown, page, config, files):
     parts = FENCES.split(markdown)
     for i, part in enumerate(parts):
         if i % 2:
-            parts[i] = re.sub(r"^( *```\w+) test$", r"\1", part, flags=re.MULTILINE)
+            parts[i] = re.sub(r"^( *```\w+) (?:test|serves)$", r"\1", part, flags=re.MULTILINE)
         else:  # a list has an empty line before it there, and one within a list four columns
             part = re.sub(r"^  (?=- \S)", "    ", part, flags=re.MULTILINE)
             parts[i] = BEFORE_LIST.sub(r"\1\n\n", LINK.sub(replaced, part))

@@ -388,12 +388,12 @@ elevation="0"/><floor name="L2" elevation="1.5"/><v_max_cabin>2</v_max_cabin><a_
 def test_a_lift_that_is_called_is_repeated(tmp_path):
     world, log = tmp_path / "house.sdf", tmp_path / "lift.lcm"
     world.write_text(LIFT)
-    order = joint_command_t()
-    order.n, order.name, order.mode = 1, ["cabin_joint"], bytes([joint_command_t.FLOOR])
-    order.value = [1.0]
+    page = (SOURCE / "docs/world-files.md").read_text(encoding="utf-8")
+    snippet = re.search(r"<!-- test: lift -->\n```python\n(.*?)```", page, re.DOTALL)[1]
     server = Server(7838, "--lockstep", "1", "--record", log, world=world)
     with server.connect() as simulation:
-        simulation.step(600, [ruedo.Command("Lift1/joint_command", order.encode())])
+        names = {"ruedo": ruedo, "joint_command_t": joint_command_t, "sim": simulation}
+        exec(snippet, names)
         simulation.quit()
     assert server.end()[0] == 0
     heights = [

@@ -1,9 +1,11 @@
-"""The documentation's examples, run as they stand: every fenced block that begins with ```sh test
-or ```python test.
+"""The documentation's examples, run as they stand: every fenced block that begins with ```sh test,
+```python test, ```xml test or ```sh serves.
 
 A block runs in an empty folder that has the tree's worlds/ and clients/ in it, the built ruedo in
 the path and a network of its own, so that nothing leaves the machine. Commands run under bash -eu;
-a Python program finds a server with worlds/arena.sdf, and goes to pytest when it is a test. Links
+a Python program finds a server with worlds/arena.sdf, and goes to pytest when it is a test. XML is
+a part of a world or of a robot, which ruedo check finds good. Of ```sh serves each command runs
+until it serves, and Ctrl C ends it. <!-- before: NAME --> above a block prepares its folder. Links
 to files are followed, too.
 """
 
@@ -11,6 +13,7 @@ import functools
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -34,10 +37,30 @@ cat said
 """
 
 
+RECORD = (
+    "ruedo run worlds/arena.sdf --disable p3at/camera --rate max --duration 0.5 --quiet --record "
+)
+BEFORE = {
+    "log": RECORD + "run.lcm",
+    "two logs": f"{RECORD}run.lcm; {RECORD}golden.lcm",
+    "bag": f"{RECORD}run.lcm; ruedo export run.lcm --ros2 run",
+    "drive": "cd tests/fit; python -c \"from drives import drive; "
+    "drive('$OLDPWD/drive.lcm', 'p3at', {}, 1, legs=8)\"",
+    "CARMEN log": "cd tests/fit; python -c \"import gzip; from test_import import *; "
+    "text = ''.join(flaser(room_scan(p), p, t) for p, t in course()); "
+    "open('$OLDPWD/drive.log.gz', 'wb').write(gzip.compress(text.encode()))\"",
+    "robots": "python tests/docs/robots.py",
+}
+
+
 def blocks(text):
-    """(line number, language, content) of each tested block."""
-    for match in re.finditer(r"^```(sh|python) test\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
-        yield text.count("\n", 0, match.start()) + 1, match.group(1), match.group(2)
+    """(line number, kind, content, name of what prepares the folder) of each tested block."""
+    for match in re.finditer(
+        r"^(?:<!-- before: ([^\n]*) -->\n)?```(sh test|python test|xml test|sh serves)\n(.*?)^```",
+        text,
+        re.MULTILINE | re.DOTALL,
+    ):
+        yield text.count("\n", 0, match.start()) + 1, match[2], match[3], match[1]
 
 
 def isolated():
@@ -51,42 +74,98 @@ def isolated():
     return []
 
 
-def run_block(language, content, folder):
-    for name in ("worlds", "clients", "docs"):
-        (folder / name).symlink_to(ROOT / name)
-    if language == "python":
-        (folder / "block.py").write_text(content, encoding="utf-8")
-        content = "python -m pytest -q block.py" if "def test_" in content else SERVED
+def isolated_shell(content, folder):
+    """The command line, with the options for subprocess, of commands in such a folder."""
+    for name in ("worlds", "clients", "docs", "tests"):
+        if not (folder / name).is_symlink():
+            (folder / name).symlink_to(ROOT / name)
     environment = {
         **os.environ,
         "PATH": f"{BINARIES}:{ROOT / '.venv/bin'}:{os.environ['PATH']}",
         "PYTHONPATH": str(BINARIES.parent / "python"),
     }
-    return subprocess.run(
-        [*isolated(), "bash", "-euo", "pipefail", "-c", content],
-        cwd=folder,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        timeout=TIMEOUT_S,
-    )
+    return [*isolated(), "bash", "-euo", "pipefail", "-c", content], {
+        "cwd": folder,
+        "env": environment,
+        "text": True,
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.STDOUT,
+    }
+
+
+def run_block(kind, content, folder):
+    if kind == "python test":
+        (folder / "block.py").write_text(content, encoding="utf-8")
+        content = "python -m pytest -q block.py" if "def test_" in content else SERVED
+    command, options = isolated_shell(content, folder)
+    return subprocess.run(command, **options, timeout=TIMEOUT_S)
+
+
+def serve(command, folder):
+    """Runs a command until it says that it serves, and ends it by Ctrl C."""
+    ready = "ruedo/markers"  # the last line of a run's channels
+    if " --view" in command or command.startswith(("ruedo play", "ruedo edit")):
+        ready = "View it at http://"
+    if " --foxglove" in command:
+        ready = "Foxglove: ws://"
+    words, options = isolated_shell(f"exec {command}", folder)
+    with subprocess.Popen(words, **options) as process:
+        said = ""
+        for line in process.stdout:
+            said += line
+            if ready in line:
+                process.send_signal(signal.SIGINT)
+        code = process.wait(TIMEOUT_S)
+        # 130: before its first step.
+        assert code in (0, 130) and ready in said, f"{command}: {code}\n{said}"
+
+
+WORLD = """<sdf version="1.9"><world name="w"><include><uri>model://ground_plane</uri></include>
+{world}<model name="box">{object}<static>true</static><link name="link"/></model>
+<include><uri>model://p3at</uri>{robot}</include></world></sdf>"""
+
+
+def check_xml(content, folder):
+    """As a part of a world, or of an object or a robot in it."""
+    said = []
+    for place in (places := ("world", "object", "robot")):
+        parts = dict.fromkeys(places, "") | {place: content}
+        (folder / "world.sdf").write_text(WORLD.format(**parts), encoding="utf-8")
+        result = run_block("sh test", "ruedo check world.sdf", folder)
+        if result.returncode == 0:
+            return
+        said.append(result.stdout)
+    pytest.fail("\n".join([content, *said]))
 
 
 CASES = [
-    pytest.param(language, content, id=f"{document.relative_to(ROOT)}:{line}")
+    pytest.param(kind, content, before, id=f"{document.relative_to(ROOT)}:{line}")
     for document in DOCUMENTS
     if document.exists()
-    for line, language, content in blocks(document.read_text(encoding="utf-8"))
+    for line, kind, content, before in blocks(document.read_text(encoding="utf-8"))
 ]
 
 
-@pytest.mark.parametrize("language, content", CASES)
-def test_examples_of_the_documentation(language, content, tmp_path):
+@pytest.mark.parametrize("kind, content, before", CASES)
+def test_examples_of_the_documentation(kind, content, before, tmp_path):
     if not isolated():
         pytest.skip("no network namespaces here (unshare -n and -rn are refused)")
     assert (BINARIES / "ruedo").exists(), f"build it first: {BINARIES}/ruedo"
-    result = run_block(language, content, tmp_path)
+    if before:
+        result = run_block("sh test", BEFORE[before], tmp_path)
+        assert result.returncode == 0, f"{before}\n{result.stdout}"
+    if kind == "sh serves":
+        for line in content.splitlines():
+            command = line.partition(" #")[0].strip()
+            if command.startswith(("ruedo run", "ruedo edit", "ruedo play")):
+                serve(command, tmp_path)
+            else:
+                assert run_block("sh test", command, tmp_path).returncode == 0, command
+        return
+    if kind == "xml test":
+        check_xml(content, tmp_path)
+        return
+    result = run_block(kind, content, tmp_path)
     assert result.returncode == 0, f"{content}\n{result.stdout}"
 
 
@@ -154,14 +233,16 @@ def test_packages_of_the_scripts_are_listed():
 
 
 def test_a_failing_block_is_seen(tmp_path):
-    assert run_block("sh", "true | false\ntrue\n", tmp_path).returncode != 0
+    assert run_block("sh test", "true | false\ntrue\n", tmp_path).returncode != 0
 
 
 def test_a_failing_test_is_seen(tmp_path):
-    assert run_block("python", "def test_it():\n    assert False\n", tmp_path).returncode != 0
+    assert run_block("python test", "def test_it():\n    assert False\n", tmp_path).returncode != 0
 
 
 def test_blocks_are_found():
-    text = "a\n```sh test\nls x\n```\nb\n```sh\nnot this\n```\n"
-    assert list(blocks(text)) == [(2, "sh", "ls x\n")]
+    text = (
+        "a\n```sh test\nls x\n```\nb\n```sh\nnot this\n```\n<!-- before: y -->\n```xml test\n```\n"
+    )
+    assert list(blocks(text)) == [(2, "sh test", "ls x\n", None), (9, "xml test", "", "y")]
     assert shutil.which("bash")
