@@ -366,17 +366,85 @@ HALL = "".join(
 )
 
 
+def block(name, pose, size, colour="0.6 0.6 0.6"):
+    """A fixed box that nothing touches. pose: x y z roll pitch yaw."""
+    return f"""<model name="{name}"><static>1</static><pose>{pose}</pose><link name="l">
+<visual name="v"><geometry><box><size>{size}</size></box></geometry><material>
+<ambient>{colour} 1</ambient><diffuse>{colour} 1</diffuse></material></visual></link></model>"""
+
+
+RED = "0.9 0.05 0.05"
+CORNERS = [[x, y, z] for x in (-5, 5) for y in (-4, 4) for z in (0, 1)]
+PILLARS = "".join(block(f"p{x}{y}", f"{x} {y} 0.5 0 0 0", ".2 .2 1") for x, y, z in CORNERS if z)
+FIRST_VIEWS = {
+    "something lies 343 km away": (
+        PILLARS + block("lost", "343582 0 0 0 0 0", "1 1 1"),
+        {"corners": CORNERS},
+    ),
+    "half a kilometre wide": (
+        "".join(
+            block(f"p{i}", f"{50 * x} {50 * y} 0.5 0 0 0", ".2 .2 1")
+            for i, (x, y, _) in enumerate(CORNERS)
+        ),
+        {"corners": [[50 * x, 50 * y, z] for x, y, z in CORNERS]},
+    ),
+    "a roof, and a cellar below the floor": (
+        f"""<model name="hall"><static>1</static><link name="l">{HALL}</link></model>"""
+        + block("floor", "0 0 -0.05 0 0 0", "10 8 0.1", RED)
+        + block("cellar", "0 0 -3 0 0 0", "9 7 0.2"),
+        {"red": [[x, y, 0] for x in (-2, 0, 2, 4) for y in (-1, 0, 1, 2)]},
+    ),
+    "the file's own camera": (
+        """<gui><camera name="c"><pose>-3 2 4 0 0.6 -0.5</pose></camera></gui>""" + PILLARS,
+        {"eye": [-3, 2, 4]},
+    ),
+    "a road 1 mm above the floor": (
+        block("floor", "0 0 -0.05 0 0 0", "40 40 0.1")
+        + block("road", "0 0 -0.009 0 0 0", "36 4 0.02", RED),
+        {"red": [[x, y / 2, 0.001] for x in range(-17, 18) for y in range(-3, 4)]},
+    ),
+}
+
+
+@pytest.mark.parametrize("what", FIRST_VIEWS)
+def test_the_first_view_is_of_what_counts(tmp_path, what):
+    content, given = FIRST_VIEWS[what]
+    world = tmp_path / "world.sdf"
+    world.write_text(
+        f"""<sdf version="1.9"><world name="w"><include><uri>model://sun</uri></include>
+{content}</world></sdf>"""
+    )
+    with running(world=world) as process:
+        browse(process.url, tmp_path, "first_view", given)
+
+
+def test_numbers_of_what_moves_are_no_edits(tmp_path):
+    with running("--disable", "p3at/camera") as process:
+        browse(process.url, tmp_path, "numbers")
+
+
 UPSTAIRS = """<model name="upstairs"><static>1</static><pose>1 2 1.9 0 0 0</pose><link name="l">
 <collision name="c"><geometry><box><size>4 5 0.2</size></box></geometry></collision>
 <visual name="v"><geometry><box><size>4 5 0.2</size></box></geometry></visual></link></model>
 <include><uri>model://p3dx</uri><pose>-3 -2 0 0 0 0</pose></include>"""
 
 
-def test_clicks_meet_what_is_seen(tmp_path):
+TILT = 0.2  # rad: a ramp that rises along x from the origin, its surface through it
+RAMP = UPSTAIRS.replace(
+    "1 2 1.9 0 0 0", f"{-0.1 * math.sin(TILT)} 0 {-0.1 * math.cos(TILT)} 0 {-TILT} 0"
+).replace("4 5 0.2", "9 9 0.2")
+
+
+@pytest.mark.parametrize(
+    ("content", "point"),
+    [(UPSTAIRS, [0.5, 2.5, 2.0]), (RAMP, [2.0, 1.5, 2.0 * math.tan(TILT)])],
+    ids=["upstairs", "ramp"],
+)
+def test_clicks_meet_what_is_seen(tmp_path, content, point):
     world = tmp_path / "world.sdf"
-    world.write_text(BARE % UPSTAIRS)
+    world.write_text(BARE % content)
     with running(world=world) as process:
-        browse(process.url, tmp_path, "ground", [0.5, 2.5, 2.0])
+        browse(process.url, tmp_path, "ground", point)
 
 
 SLAB = """<sdf version="1.9"><world name="slab"><include><uri>model://sun</uri></include>

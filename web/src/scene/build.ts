@@ -5,6 +5,7 @@ import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { Crowd } from "./crowd";
 import { arrived, finishesOf } from "./finish";
 import { kFewLinks, plainKinds } from "./plain";
+import { levelsOf, lift, sheetsOf } from "./sheets";
 import {
   Flag,
   type LinkData,
@@ -138,8 +139,11 @@ class Corners {
 export class SceneBuilder {
   readonly loading: Promise<void>[] = []; // textures being loaded
   private readonly textures = new Map<number, THREE.Texture>();
+  private readonly levels: ReadonlyMap<Part, number>; // of what lies on something else
 
-  constructor(private readonly files: SceneFiles) {}
+  constructor(private readonly files: SceneFiles) {
+    this.levels = levelsOf(sheetsOf(files));
+  }
 
   build(): Built {
     const still = new THREE.Group(),
@@ -205,7 +209,7 @@ export class SceneBuilder {
       const alone = part.diffuse[3]! < 0.996 || flags & (Flag.textured | Flag.ground);
       const key = alone
         ? `alone ${groups.size}`
-        : `${flags & Flag.doubleSided} ${part.specular[0]! > 0.3} ${part.emissive.join()} ${part.shadow}`;
+        : `${flags & Flag.doubleSided} ${part.specular[0]! > 0.3} ${part.emissive.join()} ${part.shadow} ${this.levels.get(part) ?? 0}`;
       groups.set(key, [...(groups.get(key) ?? []), part]);
     }
     return [...groups.values()].map((group) => {
@@ -315,6 +319,7 @@ export class SceneBuilder {
       opacity,
       depthWrite: opacity >= 0.996,
     });
+    lift(material, this.levels.get(part) ?? 0);
     if (flags & Flag.ground) {
       material.map = gridTexture();
       const extent = Math.hypot(part.matrix[0]!, part.matrix[4]!, part.matrix[8]!),

@@ -21,7 +21,8 @@ export function finishesOf(mesh: THREE.Mesh): THREE.Material[] {
 function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
   const { vertexColors, emissive, side, transparent, opacity, depthWrite, alphaTest, wireframe } =
     fine;
-  const { clippingPlanes, clipShadows } = fine;
+  const { clippingPlanes, clipShadows } = fine,
+    { polygonOffset, polygonOffsetFactor, polygonOffsetUnits } = fine;
   fine.userData.plain ??= plainMaterial({
     vertexColors,
     emissive,
@@ -33,6 +34,9 @@ function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
     wireframe,
     clippingPlanes,
     clipShadows,
+    polygonOffset,
+    polygonOffsetFactor,
+    polygonOffsetUnits,
     map: fine.map && plainPicture(fine.map),
   });
   return fine.userData.plain as THREE.MeshLambertMaterial;
