@@ -62,7 +62,8 @@ def test_no_path_escapes(server, path):
 
 
 def test_only_local_names_and_its_own_pages(server):
-    assert get(server.port, "/", Host="evil.example")[0] == 403
+    for host in ("evil.example", f"127.0.0.1:{server.port}.evil.com", "localhost.evil.com"):
+        assert get(server.port, "/", Host=host)[0] == 403, host
     assert get(server.port, "/", method="POST")[0] == 405
     assert Socket(server.port, Host="evil.example").status != 101
     assert Socket(server.port, Origin="http://evil.example").status != 101

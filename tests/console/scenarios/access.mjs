@@ -3,7 +3,7 @@
 // but the view works.
 import { readFileSync } from "node:fs";
 
-export default async function access({ page, until, check, ready, picture, expect }) {
+export default async function access({ page, until, check, ready, fact, picture, expect }) {
   const axe = readFileSync("node_modules/axe-core/axe.min.js", "utf8");
   const faults = () =>
     page.evaluate(async () =>
@@ -261,9 +261,7 @@ export default async function access({ page, until, check, ready, picture, expec
   await page.keyboard.press(" ");
   await until("and can be paused", () => document.getElementById("state").textContent === "paused");
   await page.keyboard.press(" ");
-  const x = await page.evaluate(() =>
-    parseFloat(document.querySelector('[data-fact="pose"]').textContent),
-  );
+  const x = await fact("pose");
   await page.keyboard.down("KeyW");
   await until(
     "and driven",

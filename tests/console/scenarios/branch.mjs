@@ -14,6 +14,7 @@ export default async function branch({ page, seen, until, check, ready, picture 
     rewind.show(rewind.range.end - 0.8);
     rewind.step(false);
   });
+  await until("(the past is shown)", () => window.ruedo.page.now.past);
   const time = await page.evaluate(() => window.ruedo.page.now.past.now);
   await page.locator("#branch").click();
   await until("its command is shown", () => document.getElementById("command")?.textContent);

@@ -154,7 +154,14 @@ const tools = {
     seen(what);
   },
   picture: (name) => page.screenshot({ path: join(folder, `${name}.png`) }),
-  fact: (name) => page.locator(`[data-fact="${name}"]`).innerText(),
+  // The number that a fact of the chosen robot begins with, once there is one.
+  fact: async (name) => {
+    const number = await page.waitForFunction((wanted) => {
+      const text = document.querySelector(`[data-fact="${wanted}"]`)?.textContent ?? "";
+      return /^-?\d/.test(text) && { value: parseFloat(text) };
+    }, name);
+    return (await number.jsonValue()).value;
+  },
   clock: async () => parseFloat(await page.locator("#clock").innerText()),
   // What the server says of itself: sim time in us, paused, rate.
   server: () =>
@@ -171,28 +178,59 @@ const tools = {
         answered_ms: performance.now(),
       };
     }, kAnyBody),
-  // Until the camera and the layout are at rest. They move with the page's frames, of which there
-  // are few on a slow machine.
-  still: () =>
-    page.evaluate(async (patience_ms) => {
-      const { camera } = window.ruedo.stage.view,
-        canvas = document.getElementById("canvas"),
-        end = performance.now() + patience_ms;
-      const look = () => {
-        const { left, top, width, height } = canvas.getBoundingClientRect();
-        camera.updateMatrixWorld(); // else it is of the last frame
-        return [camera.matrixWorld.elements, camera.projectionMatrix.elements]
-          .flatMap((elements) => [...elements])
-          .concat(left, top, width, height)
-          .map((v) => v.toFixed(3))
-          .join();
-      };
-      for (let was = "", is = look(); is !== was;) {
-        if (performance.now() > end) throw new Error("the camera did not come to rest");
-        for (let i = 0; i < 3; ++i) await new Promise((next) => requestAnimationFrame(next));
-        [was, is] = [is, look()];
+  // Until the server says that of itself.
+  serverIs: async (what, test) => {
+    const end = performance.now() + kPatience_ms;
+    let state = await tools.server();
+    while (!test(state) && performance.now() < end) state = await tools.server();
+    tools.check(what, test(state), JSON.stringify(state));
+  },
+  // Until a paused run is shown as it is, and nothing of it is left to draw.
+  drawn: async () => {
+    const { utime } = await tools.server();
+    await tools.until(
+      "(the last state is shown)",
+      (t) => Math.abs(window.ruedo.page.now.time_s - t) < 1e-6,
+      utime * 1e-6,
+    );
+    await page.evaluate(async (patience_ms) => {
+      const { stage } = window.ruedo,
+        end = performance.now() + patience_ms,
+        next = () => new Promise((done) => requestAnimationFrame(done));
+      for (let still = 0, was = stage.frames; still < 10; was = stage.frames) {
+        if (performance.now() > end) throw new Error("the page does not stop drawing");
+        await next();
+        still = was === stage.frames ? still + 1 : 0;
       }
-    }, kPatience_ms),
+    }, kPatience_ms);
+  },
+  // Until the camera and the layout are at rest. They move with the page's frames, of which there
+  // are few on a slow machine. further: of the first further view instead.
+  still: (further = false) =>
+    page.evaluate(
+      async ([patience_ms, isFurther]) => {
+        const { stage } = window.ruedo,
+          [other] = stage.further,
+          { camera } = isFurther ? other.view : stage.view,
+          canvas = isFurther ? other.canvas : document.getElementById("canvas"),
+          end = performance.now() + patience_ms;
+        const look = () => {
+          const { left, top, width, height } = canvas.getBoundingClientRect();
+          camera.updateMatrixWorld(); // else it is of the last frame
+          return [camera.matrixWorld.elements, camera.projectionMatrix.elements]
+            .flatMap((elements) => [...elements])
+            .concat(left, top, width, height)
+            .map((v) => v.toFixed(3))
+            .join();
+        };
+        for (let was = "", is = look(); is !== was;) {
+          if (performance.now() > end) throw new Error("the camera did not come to rest");
+          for (let i = 0; i < 3; ++i) await new Promise((next) => requestAnimationFrame(next));
+          [was, is] = [is, look()];
+        }
+      },
+      [kPatience_ms, further],
+    ),
   // Where those metres are on the screen, by the page's own camera, once that is at rest.
   onScreen: async (x, y, z = 0) => {
     await tools.still();

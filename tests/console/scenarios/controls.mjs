@@ -12,7 +12,8 @@ const kLayers = {
 };
 
 export default async function controls(tools) {
-  const { page, seen, until, check, ready, still, onScreen, server, picture } = tools;
+  const { page, seen, until, check, ready, still, drawn, onScreen, server, serverIs, picture } =
+    tools;
   await ready();
   // Greatest and least speed ahead and turn rate since the last mark: a slow page sees few of them.
   await page.evaluate(() => {
@@ -91,14 +92,14 @@ export default async function controls(tools) {
   await again();
 
   // ---- a motion primitive
+  // Of the newest message: what is shown may be of the one before.
   const place = () =>
-    page.evaluate(() =>
-      document
-        .querySelector('[data-fact="pose"]')
-        .textContent.split(/[^-.0-9]+/)
-        .slice(0, 2)
-        .map(Number),
-    );
+    page.evaluate(() => {
+      const { stage } = window.ruedo,
+        { bases } = stage.bodies.description,
+        { x, y } = stage.bodies.planar(bases.findIndex(({ robot }) => robot === "p3dx"));
+      return [x, y];
+    });
   const before = await place();
   for (const odd of ["1e9", ""]) {
     await page.getByLabel("how far").fill(odd);
@@ -178,12 +179,7 @@ export default async function controls(tools) {
       stage.renderer.render(stage.scene, stage.view.camera);
       return document.getElementById("canvas").toDataURL();
     });
-  await until("(nothing is left to draw)", () => {
-    const { stage } = window.ruedo,
-      was = window.drawn;
-    window.drawn = stage.frames;
-    return was === stage.frames;
-  });
+  await drawn();
   for (const [layer, objects] of Object.entries(kLayers)) {
     const visible = () =>
       page.evaluate(
@@ -197,7 +193,7 @@ export default async function controls(tools) {
     const isCovered = layer === "trail"; // by that of the odometry
     if (isCovered) await click("odometry");
     const was = await visible(),
-      drawn = await draw();
+      before = await draw();
     await click();
     const is = await visible(),
       other = await draw();
@@ -206,9 +202,9 @@ export default async function controls(tools) {
       was.length > 0 && was.every((v, i) => v !== is[i]),
       `${was} before and ${is} after`,
     );
-    check(`${layer} make a difference to the picture`, drawn !== other, "the same picture");
+    check(`${layer} make a difference to the picture`, before !== other, "the same picture");
     await click();
-    check(`(${layer} are as they were)`, drawn === (await draw()), "another picture");
+    check(`(${layer} are as they were)`, before === (await draw()), "another picture");
     if (isCovered) await click("odometry");
   }
   await page.evaluate(() => window.ruedo.stage.setAutomatic(true));
@@ -340,9 +336,7 @@ export default async function controls(tools) {
   // ---- rate
   const rated = async (what, value, rate) => {
     await page.getByLabel("rate").selectOption(value);
-    let state = await server();
-    for (let i = 0; i < 100 && state.rate !== rate; ++i) state = await server();
-    check(what, state.rate === rate, JSON.stringify(state));
+    await serverIs(what, (state) => state.rate === rate);
   };
   await rated("the server has the rate that was chosen", "0.25", 0.25);
   // Sim time between two answers against real time from before the first question to after the

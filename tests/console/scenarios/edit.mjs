@@ -13,10 +13,8 @@ export default async function edit({ page, seen, until, check, picture, still, o
     "it opens with the page World",
     (await page.getByRole("tab", { name: "World" }).getAttribute("aria-selected")) === "true",
   );
-  check(
-    "it says where it saves to",
-    /Save to .*\.sdf/.test(await page.locator("#save").innerText()),
-    await page.locator("#save").innerText(),
+  await until("it says where it saves to", () =>
+    /Save to .*\.sdf/.test(document.getElementById("save")?.textContent ?? ""),
   );
   await page.keyboard.press("3");
   const has = (name) =>
@@ -189,13 +187,15 @@ export default async function edit({ page, seen, until, check, picture, still, o
       ["size-x", "size-y", "size-z"].map(value).join() === "0.4,0.4,0.8"
     );
   });
-  const text = () =>
-    page.evaluate(() => window.ruedo.editor.textOf(window.ruedo.page.now.selected));
-  const becomes = async (what, pattern) => {
-    for (let i = 0; i < 100 && !pattern.test((await text()) ?? ""); ++i)
-      await page.waitForTimeout(50);
-    check(what, pattern.test(await text()), await text());
-  };
+  const becomes = (what, pattern) =>
+    until(
+      what,
+      async (source) => {
+        const { editor, page } = window.ruedo;
+        return new RegExp(source).test((await editor.textOf(page.now.selected)) ?? "");
+      },
+      pattern.source,
+    );
   await property("size-x").fill("0.5");
   await property("size-x").press("Tab");
   await becomes("a size in metres", /<size>0\.5 0\.4 0\.8<\/size>/);
@@ -240,10 +240,9 @@ export default async function edit({ page, seen, until, check, picture, still, o
   await page.locator("#canvas").focus();
   await page.keyboard.press("Control+s");
   await until("it is saved", () => window.notes.some((note) => /^Saved to/.test(note)));
-  check(
+  await until(
     "nothing is left to save",
-    !/•/.test(await page.locator("#save").innerText()),
-    await page.locator("#save").innerText(),
+    () => !/•/.test(document.getElementById("save").textContent),
   );
   console.log(
     `poses: ${JSON.stringify(await page.evaluate(() => Object.fromEntries(window.ruedo.editor.models.map(({ name }) => [name, window.ruedo.editor.pose(name)]))))}`,

@@ -7,7 +7,16 @@ export default async function events({ page, until, check, seen, ready, given, p
   if (!given) return live({ page, until, check, seen });
   await page.keyboard.press(" ");
   await until("(it stands still)", () => !window.ruedo.page.now.playback.playing);
-  await until("(events are there)", () => window.ruedo.page.now.events.length > 0);
+  await until(
+    "(events are there)",
+    (wanted) =>
+      wanted.every(([, kind, robot, words]) =>
+        window.ruedo.page.now.events.some(
+          (e) => e.kind === kind && e.robot === robot && e.text.includes(words),
+        ),
+      ),
+    given.events,
+  );
   const told = await page.evaluate(() =>
     window.ruedo.page.now.events.map(({ t, kind, robot, text }) => [t, kind, robot, text]),
   );

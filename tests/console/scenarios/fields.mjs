@@ -38,7 +38,7 @@ export default async function fields({ page, until, check, ready, picture }) {
   const before = await points(0);
   await until(
     "the plot grows",
-    (n) => window.ruedo.plots.panes[0].series.every(({ times }) => times.length > n / 2 + 10),
+    (n) => window.ruedo.plots.panes[0].series.every(({ times }) => times.length > n / 2 + 20),
     before,
   );
   await until("(statistics)", () =>
@@ -112,6 +112,24 @@ export default async function fields({ page, until, check, ready, picture }) {
     () =>
       window.ruedo.page.now.tab === "Plots" &&
       window.ruedo.plots.panes.at(-1).series.some(({ path }) => path === "v"),
+  );
+
+  // ---- one infinite value
+  const scales = await page.evaluate(() => {
+    const { plots, pages } = window.ruedo,
+      [pane] = plots.panes,
+      [{ values }] = pane.series;
+    values[values.length >> 1] = Infinity;
+    pane.touch();
+    pane.draw(0, performance.now());
+    pages.speed.add(0, pages.speed.data[0].at(-1), -Infinity);
+    pages.speed.draw();
+    return [pane.plot, pages.speed.plot].map(({ scales: { y } }) => [y.min, y.max]);
+  });
+  check(
+    "one infinite value hides no others",
+    scales.every(([low, high]) => low > -100 && high < 100 && high > low + 0.01),
+    JSON.stringify(scales),
   );
 
   // ---- zoomed, and over each other

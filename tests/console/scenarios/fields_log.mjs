@@ -26,6 +26,15 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
     (text) => document.querySelector(".statistics .number")?.textContent === text,
     String(Number(least.toPrecision(5))),
   );
+  await page.getByLabel("field to plot").fill("y");
+  await page.locator("#plot").click();
+  await page.locator(".pane").getByRole("button", { name: "x-y" }).click();
+  await until(
+    "the whole path of the log is seen at once",
+    (n) => window.ruedo.plots.panes[0].curves?.points[0].length === n,
+    count,
+  );
+  await page.locator(".pane").getByRole("button", { name: "x-y" }).click();
   await page.locator(".pane").scrollIntoViewIfNeeded();
   await page.locator(".pane .u-over").click();
   await until(

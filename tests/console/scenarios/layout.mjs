@@ -34,16 +34,27 @@ export default async function layout({ page, seen, told, until, expect, ready, p
   await page.getByRole("tab", { name: "Plots" }).click();
   await page.evaluate(() => window.ruedo.plots.plot("p3at/odometry", "x", false));
   await page.locator('[data-layer="sonar"]').click();
+  const notes = async (state) => {
+    await page.locator("#open-panels").click();
+    await page.locator("#panels").getByText("Notes", { exact: true }).click();
+    await page.keyboard.press("Escape");
+    await page.getByRole("tab", { name: "Notes" }).waitFor({ state });
+  };
+  await notes("detached");
   const first = await page.evaluate(open);
   const one = await change();
   const two = await world();
   await isOpen("plots are of their world", [two, "Plots false 0"]);
+  await notes("attached"); // a new world begins with the last arrangement
   await page.getByRole("tab", { name: "World" }).click();
   await page.locator('[data-layer="sonar"]').click();
   await page.reload();
   await ready();
   await isOpen("what was open is open again", [two, "World true 0"]);
+  await page.getByRole("tab", { name: "Notes" }).waitFor();
   await change();
   await isOpen("and in the other world what was open there", [one, first]);
+  await page.getByRole("tab", { name: "Notes" }).waitFor({ state: "detached" });
+  seen("arranged as it was there");
   await picture("layout");
 }

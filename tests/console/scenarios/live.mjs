@@ -21,7 +21,7 @@ export default async function live({
     ),
   );
   await page.locator("canvas#canvas").focus();
-  const before = parseFloat(await fact("pose"));
+  const before = await fact("pose");
   await page.keyboard.down("KeyW");
   await until(
     "the robot moved when driven",

@@ -9,7 +9,9 @@ export default async function odd({ page, until, check, ready, server, expect, p
   await page.locator("#canvas").focus();
   await page.keyboard.press(" ");
   await until("(paused)", () => document.getElementById("state").textContent === "paused");
-  check("a pause is announced", /paused/.test(await page.getByRole("status").first().innerText()));
+  await until("a pause is announced", () =>
+    /paused/.test(document.querySelector('[role="status"]').textContent),
+  );
   await page.evaluate(() => window.ruedo.choose(0));
   await page.keyboard.press("w");
   await noted("driving while paused is told", "The run is paused");
@@ -18,6 +20,24 @@ export default async function odd({ page, until, check, ready, server, expect, p
     return outlineStyle !== "none" && parseFloat(outlineWidth) >= 2;
   });
   check("the view shows that it has the focus", ring);
+
+  const share = await page.evaluate(() =>
+    [...window.ruedo.overlays.of.values()].map(({ scans }) =>
+      [...scans.values()].map(({ fan, lines }) =>
+        [fan, lines].map((s) => s.object.material.opacity),
+      ),
+    ),
+  );
+  check(
+    "rays of two robots are as strong as those of one",
+    share.length === 2 &&
+      share.every((scans) =>
+        scans.every(
+          ([fan, lines]) => Math.abs(fan - 0.05) < 1e-6 && Math.abs(lines - 0.175) < 1e-6,
+        ),
+      ),
+    JSON.stringify(share),
+  );
 
   // ---- by keyboard
   await page.keyboard.press("3");
@@ -84,10 +104,8 @@ export default async function odd({ page, until, check, ready, server, expect, p
 
   // ---- what the program warns of
   await page.getByRole("tab", { name: "Notes" }).click();
-  check(
-    "the page has the program's warnings",
-    /unsupported.*world\.sdf:\d+.*audio/.test(await page.locator("#warnings").innerText()),
-    await page.locator("#warnings").innerText(),
+  await until("the page has the program's warnings", () =>
+    /unsupported.*world\.sdf:\d+.*audio/.test(document.getElementById("warnings").textContent),
   );
 
   // ---- the graphics

@@ -2,7 +2,13 @@
 // "watched" (--control off) or "hall" (with a roof)}.
 export default async function offers({ page, given, until, check, picture }) {
   await page.setViewportSize({ width: 1100, height: 640 });
-  await until("it is drawn", () => window.ruedo?.page.now.world && window.ruedo.stage.frames > 1);
+  await until(
+    "it is drawn",
+    () =>
+      window.ruedo?.page.now.world &&
+      window.ruedo.stage.bodies.description &&
+      window.ruedo.stage.frames > 1,
+  );
   await page.getByRole("tab", { name: "Robot" }).click();
   const seen = (selector) => page.locator(selector).isVisible();
   const motions = await seen("#move"),

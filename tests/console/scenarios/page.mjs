@@ -17,11 +17,15 @@ function contrast(a, b) {
 }
 
 export default async function looks(tools) {
-  const { page, url, seen, told, until, check, ready, picture, expect } = tools;
+  const { page, url, seen, told, until, check, ready, still, picture, expect } = tools;
   // ---- from the address to the first drawn frame, best of three: printed and not checked, since
   // this machine is busy and draws in software. Checked is what makes a page slow anywhere.
   await page.setViewportSize({ width: 640, height: 400 });
-  const loads = [];
+  const loads = [],
+    warnings = [];
+  page.on("console", (message) => {
+    if (message.type() === "warning") warnings.push(message.text());
+  });
   for (let i = 0; i < 3; ++i) {
     await page.goto(url, { waitUntil: "load" });
     await until("(the first frame is drawn)", () => window.ruedo?.stage.firstDrawn_ms > 0);
@@ -47,6 +51,7 @@ export default async function looks(tools) {
     best.requests > 4 && best.requests < 20 && best.kilobytes < 1000,
     JSON.stringify(best),
   );
+  check("it loads without warnings", warnings.length === 0, warnings.slice(0, 3).join(" | "));
   check("the world is drawn soon", best.drawn_ms < 60_000, `${best.drawn_ms} ms`);
   await page.setViewportSize({ width: 900, height: 520 });
   await ready();
@@ -62,7 +67,7 @@ export default async function looks(tools) {
       if (await page.evaluate(() => document.getElementById("app").classList.contains("closed")))
         await page.keyboard.press("p");
       await page.getByRole("tab", { name: tab }).click();
-      await page.waitForTimeout(150);
+      await still();
       const wide = await page.evaluate(() => {
         const outside = [
           ...document.querySelectorAll("#bar button, #bar select, .dv-tab, .page *, #timeline *"),
@@ -106,19 +111,28 @@ export default async function looks(tools) {
       (await page.evaluate(() => document.documentElement.dataset.theme)) === theme,
     );
     await page.getByRole("tab", { name: "Robot" }).click();
-    await page.waitForTimeout(500);
-    colours[theme] = await page.evaluate(() =>
-      [".page", ".facts dt", ".facts dd", "h2", "#bar", ".pill"].map((selector) => {
-        const element = document.querySelector(selector);
-        let behind = element;
-        while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)")
-          behind = behind.parentElement;
-        return [
-          selector,
-          getComputedStyle(element).color,
-          getComputedStyle(behind).backgroundColor,
-        ];
-      }),
+    const shown = [".page", ".facts dt", ".facts dd", "h2", "#bar", ".pill"];
+    await until(
+      "(all of it is there, in its colours)",
+      (selectors) =>
+        selectors.every((selector) => document.querySelector(selector)) &&
+        document.getAnimations().every(({ playState }) => playState === "finished"),
+      shown,
+    );
+    colours[theme] = await page.evaluate(
+      (selectors) =>
+        selectors.map((selector) => {
+          const element = document.querySelector(selector);
+          let behind = element;
+          while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)")
+            behind = behind.parentElement;
+          return [
+            selector,
+            getComputedStyle(element).color,
+            getComputedStyle(behind).backgroundColor,
+          ];
+        }),
+      shown,
     );
     for (const [selector, front, back] of colours[theme])
       if (contrast(front, back) < 4.5)
@@ -170,14 +184,16 @@ export default async function looks(tools) {
 
   // ---- the server ends, and comes back
   expect(/WebSocket|net::ERR_|Failed to load|socket/); // its end cuts off what is under way
-  const notice = () => page.locator("#notice").innerText();
   seen("end the server");
   await told();
   await until(
     "it says that the server has ended",
     () => document.getElementById("notice").textContent === "The server has ended.",
   );
-  check("and shows it in the bar", (await page.locator("#state").innerText()) === "ended");
+  await until(
+    "and shows it in the bar",
+    () => document.getElementById("state").textContent === "ended",
+  );
   await picture("ended");
   seen("begin the server");
   await told();
@@ -187,17 +203,15 @@ export default async function looks(tools) {
       document.getElementById("notice").hidden &&
       document.getElementById("state").textContent === "running",
   );
-  check(
-    "and says so",
-    await page.evaluate(() => window.notes.includes("Connected again.")),
-    "no such note",
-  );
+  await until("and says so", () => window.notes.includes("Connected again."));
   seen("kill the server");
   await told();
   await until("it says that the connection is lost", () =>
     /connection to the server is lost/.test(document.getElementById("notice").textContent),
   );
-  check("and that it tries again", /Trying again/.test(await notice()));
+  await until("and that it tries again", () =>
+    /Trying again/.test(document.getElementById("notice").textContent),
+  );
   await picture("lost");
   seen("begin the server");
   await told();

@@ -1,9 +1,9 @@
 // Panels beside the scene: where they are, further views and cameras, what was said, messages and
 // faults by hand, a part of the time line.
-export default async function panels({ page, until, check, ready, picture }) {
+export default async function panels({ page, until, check, ready, still, picture }) {
   await page.setViewportSize({ width: 1100, height: 600 });
   await ready();
-  await arrange({ page, until, check, picture });
+  await arrange({ page, until, check, still, picture });
 
   // ---- a message by hand
   await page.getByRole("tab", { name: "Channels" }).click();
@@ -68,7 +68,7 @@ export default async function panels({ page, until, check, ready, picture }) {
 }
 
 // Panels are resized, moved beside each other, closed and opened again; further views are added.
-async function arrange({ page, until, check, picture }) {
+async function arrange({ page, until, check, still, picture }) {
   const box = (selector) => page.locator(selector).boundingBox(),
     width = async () => (await box(".page")).width;
   const before = await width(),
@@ -89,10 +89,10 @@ async function arrange({ page, until, check, picture }) {
     await page.setViewportSize({ width: wide, height: 600 });
     await until("(it is arranged)", (w) => window.innerWidth === w, wide);
     await page.waitForFunction((w) => document.getElementById("dock").clientWidth === w, wide);
-    check(
+    await until(
       `the panel keeps its width in a window of ${wide} pixels`,
-      Math.abs((await width()) - kept) < 3,
-      `${await width()} of ${kept}`,
+      (kept) => Math.abs(document.querySelector(".page").getBoundingClientRect().width - kept) < 3,
+      kept,
     );
   }
 
@@ -113,22 +113,19 @@ async function arrange({ page, until, check, picture }) {
     plots.y > left.y + left.height - 1 && left.height < view.height - 100 && plots.x < 100,
     JSON.stringify([plots, left]),
   );
-  check(
-    "the view fills its part",
-    await page.evaluate(() => {
-      const { aspect } = window.ruedo.stage.view.camera,
-        { clientWidth, clientHeight } = document.getElementById("view");
-      return Math.abs(aspect - clientWidth / clientHeight) < 0.02;
-    }),
-  );
+  await until("the view fills its part", () => {
+    const { aspect } = window.ruedo.stage.view.camera,
+      { clientWidth, clientHeight } = document.getElementById("view");
+    return Math.abs(aspect - clientWidth / clientHeight) < 0.02;
+  });
   await picture("arranged");
 
   const menu = (name) => page.locator("#panels").getByText(name, { exact: true }).click();
   await page.locator("#open-panels").click();
   await menu("Notes");
-  check("a page is closed", (await tab("Notes").count()) === 0);
+  await tab("Notes").waitFor({ state: "detached" });
   await menu("Notes");
-  check("and opened", (await tab("Notes").count()) === 1);
+  await tab("Notes").waitFor();
   await menu("Add a 3-D view");
   await until("another 3-D view is drawn", () => {
     const canvas = document.querySelector(".scene-panel canvas");
@@ -157,7 +154,7 @@ async function arrange({ page, until, check, picture }) {
     same.every((value, i) => Math.abs(value - place[i]) < 1e-6),
     JSON.stringify([same, place]),
   );
-  await picks({ page, until, check });
+  await picks({ page, until, check, still });
   await page.locator("#open-panels").click();
   await page.getByLabel("add a camera").selectOption("p3at/camera");
   await page.keyboard.press("Escape");
@@ -202,14 +199,11 @@ async function arrange({ page, until, check, picture }) {
       document.querySelectorAll('[role="tab"]').length === 6 &&
       window.ruedo.page.now.shown.size === 1,
   );
-  check(
-    "one view is drawn then",
-    (await page.evaluate(() => window.ruedo.stage.further.size)) === 0,
-  );
+  await until("one view is drawn then", () => window.ruedo.stage.further.size === 0);
 }
 
 // What is clicked in a further view is what is seen there, from where that view looks.
-async function picks({ page, until, check }) {
+async function picks({ page, until, check, still }) {
   const onFurther = ([x, y, z]) =>
     page.evaluate(
       (place) => {
@@ -229,7 +223,7 @@ async function picks({ page, until, check }) {
   // Of the robot's own place on the floor, 1 m aside
   const [x, y] = await page.evaluate(() => [...window.ruedo.poses.now.slice(0, 2)]);
   const there = [x + 1, y - 1, 0];
-  await page.waitForTimeout(500); // until its camera rests
+  await still(true);
   const [px, py] = await onFurther(there);
   await page.mouse.move(px, py);
   await until(

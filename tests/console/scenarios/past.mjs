@@ -1,16 +1,6 @@
 // The last minutes of a run are viewed while it goes on: by the time line, with models that came
 // and went meanwhile.
-export default async function past({
-  page,
-  seen,
-  until,
-  check,
-  ready,
-  server,
-  picture,
-  fact,
-  onScreen,
-}) {
+export default async function past({ page, seen, until, check, ready, server, picture, onScreen }) {
   await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
   await ready();
   await page.getByRole("tab", { name: "Robot" }).click();
@@ -58,12 +48,15 @@ export default async function past({
     "what came later is not there",
     () => !window.ruedo.page.now.scene.models.some(({ name }) => name === "box"),
   );
-  check(
-    "it says how long ago that was",
-    /s ago$/.test(await page.locator("#state").innerText()),
-    await page.locator("#state").innerText(),
+  await until("it says how long ago that was", () =>
+    /s ago$/.test(document.getElementById("state").textContent),
   );
-  check("values are of that moment", Math.abs(parseFloat(await fact("pose")) - begin.x) < 0.05);
+  await until(
+    "values are of that moment",
+    (x) =>
+      Math.abs(parseFloat(document.querySelector('[data-fact="pose"]')?.textContent) - x) < 0.05,
+    begin.x,
+  );
   await picture("past");
   const first = await server();
   // Meanwhile ruedo/info, which comes once a second, tells another time.
@@ -103,6 +96,9 @@ export default async function past({
   await page.locator("#live").click();
   await until("Live shows what runs now", (x) => window.ruedo.poses.to[0] > x + 0.5, begin.x);
   await until("with all that came", box);
-  check("(nothing is said of the past)", (await page.locator("#state").innerText()) === "running");
+  await until(
+    "(nothing is said of the past)",
+    () => document.getElementById("state").textContent === "running",
+  );
   seen("all was seen");
 }

@@ -19,5 +19,8 @@ export default async function record({ page, given, until, check, ready }) {
     /^arena_\d+\.\d\ds\.lcm$/.test(download.suggestedFilename()),
     download.suggestedFilename(),
   );
-  check("and can be recorded again", (await button.innerText()) === "Record log");
+  await until(
+    "and can be recorded again",
+    () => document.getElementById("record-log").textContent === "Record log",
+  );
 }

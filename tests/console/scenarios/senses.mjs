@@ -59,6 +59,13 @@ export default async function senses({ page, until, check, seen, ready, picture 
     (await page.locator(".inset .xy-legend").innerText()) === "40 wall",
     await page.locator(".inset .xy-legend").innerText(),
   );
+  await page.locator("#inset").selectOption("probe/HEAT");
+  await page.locator(".inset canvas").hover();
+  await until("a temperature is told under the pointer: the wall's", () =>
+    /dark to bright: .* K · here 310\.00 K$/.test(
+      document.querySelector(".inset figcaption").textContent,
+    ),
+  );
   await page.locator("#inset").selectOption("probe/EYE/depth");
   await page.locator(".inset canvas").hover();
   await page.getByRole("tab", { name: "Channels" }).click();
@@ -108,7 +115,9 @@ export default async function senses({ page, until, check, seen, ready, picture 
   );
   await picture("senses");
   const triangles = () => window.ruedo.stage.renderer.info.render.triangles;
-  await until("(it is drawn)", (n) => window.ruedo.stage.frames > n, 3);
+  await page.evaluate(() => window.ruedo.stage.setShadows(false)); // theirs count, too
+  const frames = await page.evaluate(() => window.ruedo.stage.frames);
+  await until("(it is drawn)", (n) => window.ruedo.stage.frames > n + 1, frames);
   const looks = await page.evaluate(triangles);
   await layer("shapes");
   // A box of 12 triangles instead of a ball of some hundred.
@@ -174,6 +183,57 @@ export default async function senses({ page, until, check, seen, ready, picture 
     return pairs.length > 0 && pairs.every((pair) => apart(pair) > 0.05);
   });
   await picture("senses-display");
+  const colours = () => {
+    const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR");
+    return object.geometry.getAttribute("color").array.slice(0, 300).join();
+  };
+  for (const by of ["range", "intensity", "plain"]) {
+    const before = await page.evaluate(colours);
+    await page.getByLabel("coloured by").selectOption(by);
+    await until(`and coloured by ${by}`, `(${colours})() !== ${JSON.stringify(before)}`);
+  }
+  await page.getByLabel("points stay, s").fill("4");
+  await until("points stay for a while, in their places", () => {
+    const overlay = window.ruedo.overlays.of.get("probe"),
+      { count } = overlay.past.get("LIDAR")?.object.geometry.getAttribute("position") ?? {};
+    return count > (3 * overlay.clouds.get("LIDAR").seen.points.length) / 3;
+  });
+  const fade = (value) =>
+    page.getByLabel("opacity", { exact: true }).evaluate((slider, to) => {
+      slider.value = to;
+      slider.dispatchEvent(new Event("input"));
+    }, value);
+  await fade("0.5");
+  await page.getByLabel("display of").selectOption("probe");
+  await fade("0.25");
+  await until("one robot's are drawn as that robot's", () => {
+    const { material } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR").object;
+    return material.transparent && Math.abs(material.opacity - 0.25) < 0.01;
+  });
+  await plots({ page, until });
   seen("all was seen");
   check("(done)", true);
+}
+
+// Elements of arrays have the names of their joints, and a formula may be a derivative.
+async function plots({ page, until }) {
+  await page.getByRole("tab", { name: "Plots" }).click();
+  await page.getByLabel("channel to plot").selectOption("probe/joints");
+  await until("a joint's name is offered", () =>
+    [...document.querySelectorAll("#offered-fields option")].some(
+      ({ value, label }) => value === "joint_position[0]" && /shoulder/.test(label),
+    ),
+  );
+  for (const path of ["joint_position[0]", "derivative(joint_position[0])"]) {
+    await page.getByLabel("field to plot").fill(path);
+    await page.locator("#plot").click();
+  }
+  await until("and plotted beside its derivative", () => {
+    const [position, speed] = window.ruedo.plots.panes[0]?.series ?? [];
+    return (
+      /\(shoulder\)$/.test(position?.label) &&
+      position.values.length > 5 &&
+      speed?.values.filter(Number.isFinite).length > 5
+    );
+  });
 }

@@ -20,18 +20,17 @@ export default async function silent({ page, seen, until, check, ready, told, pi
   await picture("low");
   seen("stop");
   await told();
-  const state = () => document.getElementById("state").textContent;
   await until("the page says that nobody answers", () =>
     /does not answer/.test(document.getElementById("notice").textContent),
   );
-  check("and not that it runs", (await page.evaluate(state)) === "no answer");
+  await until(
+    "and not that it runs",
+    () => document.getElementById("state").textContent === "no answer",
+  );
   await picture("silent");
   seen("go on");
   await told();
   await until("it runs again", () => document.getElementById("state").textContent === "running");
-  check("nothing is said any more", !(await page.locator("#notice").isVisible()));
-  check(
-    "but that it answers",
-    await page.evaluate(() => window.notes.includes("The server answers again.")),
-  );
+  await until("nothing is said any more", () => document.getElementById("notice").hidden);
+  await until("but that it answers", () => window.notes.includes("The server answers again."));
 }

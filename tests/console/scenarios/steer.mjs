@@ -1,6 +1,6 @@
 // The basic controls in short: pause, step, drive, place, rate, reset. For each transport;
 // controls.mjs has the details.
-export default async function steer({ page, seen, until, ready, server, check }) {
+export default async function steer({ page, seen, until, ready, server, serverIs, fact, check }) {
   await page.setViewportSize({ width: 900, height: 300 }); // software draws every pixel
   await ready();
   await page.locator("#canvas").focus();
@@ -20,8 +20,7 @@ export default async function steer({ page, seen, until, ready, server, check })
   await page.keyboard.press(" ");
   await state("running");
   seen("space goes on");
-  const x = () => parseFloat(document.querySelector('[data-fact="pose"]')?.textContent ?? "NaN");
-  const begin = await page.evaluate(x);
+  const begin = await fact("pose");
   await page.keyboard.down("KeyW");
   await until(
     "W drives",
@@ -30,9 +29,7 @@ export default async function steer({ page, seen, until, ready, server, check })
   );
   await page.keyboard.up("KeyW");
   await page.getByLabel("rate").selectOption("0.25");
-  let is = await server();
-  for (let i = 0; i < 50 && is.rate !== 0.25; ++i) is = await server();
-  check("a rate is taken", is.rate === 0.25, is.rate);
+  await serverIs("a rate is taken", ({ rate }) => rate === 0.25);
   await page.keyboard.press("b");
   await page.locator("#canvas").click({ position: { x: 420, y: 150 } }); // above the time line
   await until("a box is placed", () =>
