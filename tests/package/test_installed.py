@@ -148,6 +148,31 @@ def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
     assert f"searched in {prefix.resolve()}/share/ruedo/worlds" in said, said
 
 
+@pytest.mark.parametrize("language", ["python", "cpp", "java"])
+def test_a_program_of_the_clients_words(language, prefix, tmp_path):
+    """Launch options, streams joined by stamp, driving, bodies, joints and maps."""
+    here = Path(__file__).parent / "api"
+    more = {}
+    if language == "python":
+        words = [sys.executable, here / "api.py"]
+        more = {"PYTHONPATH": f"{prefix}/lib/ruedo/python"}
+    elif language == "cpp":
+        flags = run(
+            *("pkg-config", "--cflags", "--libs", "ruedo"),
+            more={"PKG_CONFIG_PATH": str(next(prefix.glob("lib/**/pkgconfig")))},
+        ).split()
+        run("g++", "-std=c++17", here / "api.cpp", "-o", tmp_path / "api", *flags)
+        words = [tmp_path / "api"]
+    else:
+        jar = prefix / "share/java/ruedo.jar"
+        if not (shutil.which("javac") and jar.exists()):
+            pytest.skip("no JDK here")
+        run("javac", "-Xlint:all", "-cp", jar, "-d", tmp_path, here / "Api.java")
+        words = ["java", "-cp", f"{jar}:{tmp_path}", "Api"]
+    said = run(*words, tmp_path, cwd=tmp_path, more=more)
+    assert said == "rate 20\ndrove True\njoint position\nray 0.95\n"
+
+
 def test_what_a_project_installs_starts(prefix, tmp_path):
     """Each of the libraries; from and to folders with blanks in their names."""
     ours = tmp_path / "with a blank/ruedo"
