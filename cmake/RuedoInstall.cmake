@@ -21,7 +21,7 @@ install(TARGETS ruedo_client EXPORT ruedo ARCHIVE DESTINATION ${CMAKE_INSTALL_LI
 set_target_properties(ruedo_engine_library PROPERTIES INSTALL_RPATH "\$ORIGIN/ruedo")
 install(TARGETS ruedo_engine_library EXPORT ruedo LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/engine.h ${PROJECT_SOURCE_DIR}/include/ruedo/errors.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
-install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/client.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_samples.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_map.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_markers.h
+install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/client.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_samples.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_map.h ${PROJECT_SOURCE_DIR}/include/ruedo/setting.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_markers.h
   ${PROJECT_SOURCE_DIR}/include/ruedo/client_types.h ${PROJECT_BINARY_DIR}/generated/include/ruedo/client_enums.h
   ${PROJECT_BINARY_DIR}/generated/include/ruedo/client_messages.h ${PROJECT_BINARY_DIR}/generated/include/ruedo/client_requests.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)

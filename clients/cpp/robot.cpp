@@ -249,6 +249,16 @@ Device<Odometry> Robot::odometry() const {
 Stream<OdometryTwist> Robot::odometry_twist() const {
   return first_stream<OdometryTwist>(*core_, name_, "velocity of odometry");
 }
+Camera Robot::camera(const std::string& name) const {
+  const Device<Image> found = device<Image>(name);
+  return {core_, stream_of(*core_, name_, found.channel()), found.info()};
+}
+Device<Boxes2D> Robot::boxes_2d() const {
+  return first_device<Boxes2D>(*core_, name_, "bounding box camera");
+}
+Device<Boxes3D> Robot::boxes_3d() const {
+  return first_device<Boxes3D>(*core_, name_, "bounding box camera in space");
+}
 Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
 Device<NavSat> Robot::gps() const {
   return first_device<NavSat>(*core_, name_, "satellite receiver");

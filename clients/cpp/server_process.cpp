@@ -125,13 +125,10 @@ void add_options(const LaunchOptions& options, std::vector<std::string>& command
   if (options.lockstep != 0) add("--lockstep", std::to_string(options.lockstep));
   for (const std::string& model : options.spawn) add("--spawn", model);
   for (const std::string& device : options.disable) add("--disable", device);
-  for (const auto& [key, value] : options.set)
-    add("--set", std::string(key).append("=").append(value));
-  if (std::isfinite(options.duration)) {
-    std::ostringstream seconds;
-    seconds << options.duration;
-    add("--duration", seconds.str());
-  }
+  for (const auto& [key, value] : options.settings)
+    add("--set", std::string(key).append("=").append(value.text()));
+  if (std::isfinite(options.duration.count()))
+    add("--duration", Setting(options.duration.count()).text());
   if (options.paused) command.emplace_back("--paused");
   if (!options.record.empty()) add("--record", options.record);
   if (!options.snapshots.empty()) add("--snapshots", options.snapshots);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <stdexcept>
 #include <type_traits>
 #include <utility>
 
@@ -39,6 +40,8 @@ class StreamCore::Arrival {
   }
   size_t size() const { return bytes_.size(); }
   std::optional<int64_t> utime() const { return utime_; }  // us; nothing: its type does not say
+
+  int64_t number = 0;  // of the samples of the stream, with those that were lost
 
  private:
   const std::optional<int64_t> utime_;
@@ -153,8 +156,8 @@ void StreamCore::on_message(const uint8_t* bytes, size_t size) {
     const std::lock_guard lock(mutex_);
     newest_ = arrival;
     fault_ = nullptr;
+    arrival->number = count_ += 1 + lost_before(utime);
     keep(arrival);
-    count_ += 1 + lost_before(utime);
     if (!waiting_.empty()) core->progress().use(core->utime(), waiting_);
   }
   news_.notify_all();
@@ -196,14 +199,13 @@ std::shared_ptr<const Sample> StreamCore::decoded(const std::vector<uint8_t>& by
 
 void StreamCore::keep(const std::shared_ptr<Arrival>& arrival) {
   constexpr size_t kMost = 256, kMostBytes = 4u << 20;
-  if (!arrival->utime()) return;
-  if (!kept_.empty() && *arrival->utime() < *kept_.back()->utime()) {  // sim time was reset
+  if (!kept_.empty() && arrival->utime() < kept_.back()->utime()) {  // sim time was reset
     kept_.clear();
     kept_bytes_ = 0;
   }
   kept_.push_back(arrival);
   kept_bytes_ += arrival->size();
-  while (kept_.size() > kMost || kept_bytes_ > kMostBytes) {
+  while (kept_.size() > least_kept_ && (kept_.size() > kMost || kept_bytes_ > kMostBytes)) {
     kept_bytes_ -= kept_.front()->size();
     kept_.pop_front();
   }
@@ -211,7 +213,7 @@ void StreamCore::keep(const std::shared_ptr<Arrival>& arrival) {
 
 int64_t StreamCore::kept_from() {
   const std::lock_guard lock(mutex_);
-  return kept_.empty() ? 0 : *kept_.front()->utime();
+  return kept_.empty() ? 0 : kept_.front()->utime().value_or(0);
 }
 
 std::optional<StreamCore::Neighbours> StreamCore::around(int64_t utime, Duration timeout) {
@@ -224,13 +226,12 @@ std::optional<StreamCore::Neighbours> StreamCore::around(int64_t utime, Duration
   std::shared_ptr<Arrival> before, after;
   {
     std::unique_lock lock(mutex_);
-    await(*core, lock, timeout, [&] { return !kept_.empty() && *kept_.back()->utime() >= utime; });
-    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& arrival) {
-      return *arrival->utime() >= utime;
-    });
+    const auto reached = [utime](const auto& arrival) { return arrival->utime() >= utime; };
+    await(*core, lock, timeout, [&] { return !kept_.empty() && reached(kept_.back()); });
+    const auto found = std::find_if(kept_.begin(), kept_.end(), reached);
     after = *found;
-    if (*after->utime() != utime && found == kept_.begin()) return std::nullopt;
-    before = *after->utime() == utime ? after : *std::prev(found);
+    if (after->utime() != utime && found == kept_.begin()) return std::nullopt;
+    before = after->utime() == utime ? after : *std::prev(found);
   }
   core->note_use();
   return Neighbours{before->sample(*this), after->sample(*this)};
@@ -245,10 +246,24 @@ int64_t StreamCore::lost_before(std::optional<int64_t> utime) {
   return std::max<int64_t>(0, std::llround(std::min(gap / period_us_, kMost)) - 1);
 }
 
-// Whether the newest sample is what the reader wants.
-bool StreamCore::serves(int64_t seen, bool new_one, int64_t not_before) const {
-  if (!newest_ || !new_one) return newest_ != nullptr;
-  return seen != count_ && newest_->utime().value_or(not_before) >= not_before;
+void StreamCore::set_queue_depth(int64_t depth) {
+  constexpr int64_t kMost = 1000;
+  if (depth < 1 || depth > kMost)
+    throw std::invalid_argument("queue_depth is " + std::to_string(depth) + "; allowed are 1 to " +
+                                std::to_string(kMost));
+  depth_ = depth;
+  const std::lock_guard lock(mutex_);
+  least_kept_ = std::max(least_kept_, static_cast<size_t>(depth));
+}
+
+std::shared_ptr<StreamCore::Arrival> StreamCore::unseen(int64_t seen, int64_t depth,
+                                                        int64_t not_before) const {
+  std::shared_ptr<Arrival> found;
+  for (auto arrival = kept_.rbegin(); arrival != kept_.rend() && depth > 0; ++arrival, --depth) {
+    if ((*arrival)->number <= seen || (*arrival)->utime().value_or(not_before) < not_before) break;
+    found = *arrival;
+  }
+  return found;
 }
 
 void StreamCore::await(Core& core, std::unique_lock<std::mutex>& lock, Duration timeout,
@@ -277,7 +292,7 @@ void StreamCore::await(Core& core, std::unique_lock<std::mutex>& lock, Duration 
 }
 
 std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen,
-                                               std::atomic<int64_t>& skipped, bool new_one,
+                                               std::atomic<int64_t>& skipped, int64_t depth,
                                                Duration timeout) {
   const auto core = connection();
   subscribe(*core);
@@ -287,10 +302,12 @@ std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen,
   std::shared_ptr<Arrival> arrival;
   {
     std::unique_lock lock(mutex_);
-    await(*core, lock, timeout, [&] { return serves(seen, new_one, not_before); });
-    arrival = newest_;
-    if (seen > 0) skipped += std::max<int64_t>(count_ - seen - 1, 0);
-    last_read_ = seen = count_;
+    await(*core, lock, timeout, [&] {
+      arrival = depth == 0 ? newest_ : unseen(seen, depth, not_before);
+      return arrival != nullptr;
+    });
+    if (seen > 0) skipped += std::max<int64_t>(arrival->number - seen - 1, 0);
+    last_read_ = seen = arrival->number;
     last_skipped_ = skipped.load();
   }
   core->note_use();
@@ -305,7 +322,10 @@ std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen,
 
 template <class SampleType>
 Stream<SampleType>::Stream(std::shared_ptr<StreamCore> core)
-    : core_(std::move(core)), seen_(core_->last_read()), skipped_(core_->last_skipped()) {}
+    : core_(std::move(core)),
+      seen_(core_->last_read()),
+      skipped_(core_->last_skipped()),
+      depth_(core_->queue_depth()) {}
 
 template <class SampleType>
 const std::string& Stream<SampleType>::channel() const {
@@ -314,12 +334,12 @@ const std::string& Stream<SampleType>::channel() const {
 
 template <class SampleType>
 SampleType Stream<SampleType>::latest(Duration timeout) const {
-  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, false, timeout));
+  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, 0, timeout));
 }
 
 template <class SampleType>
 SampleType Stream<SampleType>::next(Duration timeout) const {
-  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, true, timeout));
+  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, depth_, timeout));
 }
 
 template <class SampleType>
@@ -351,6 +371,12 @@ void Stream<SampleType>::subscribe() const {
 template <class SampleType>
 int64_t Stream<SampleType>::dropped() const {
   return skipped_ + core_->missed();
+}
+
+template <class SampleType>
+void Stream<SampleType>::set_queue_depth(int64_t depth) {
+  core_->set_queue_depth(depth);
+  depth_ = depth;
 }
 
 template <class SampleType>

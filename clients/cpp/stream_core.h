@@ -38,10 +38,13 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   // Where a new reader begins.
   int64_t last_read() const { return last_read_; }
   int64_t last_skipped() const { return last_skipped_; }
-  // seen, skipped: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout,
-  // TypeMismatch, NoServer.
+  int64_t queue_depth() const { return depth_; }
+  void set_queue_depth(int64_t depth);  // of new readers; throws std::invalid_argument
+  // seen, skipped: the reader's. depth: of the samples that it has not seen, the oldest among so
+  // many newest, for which it waits; 0: the newest, seen or not. Throws Timeout, TypeMismatch,
+  // NoServer.
   std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, std::atomic<int64_t>& skipped,
-                                     bool new_one, Duration timeout);
+                                     int64_t depth, Duration timeout);
   struct Neighbours {
     std::shared_ptr<const Sample> before, after;  // the same where one is of the moment
   };
@@ -70,7 +73,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   void call_back(Arrival& arrival);
   std::shared_ptr<const Sample> decoded(const std::vector<uint8_t>& bytes) const;
   int64_t lost_before(std::optional<int64_t> utime);
-  bool serves(int64_t seen, bool new_one, int64_t not_before) const;
+  std::shared_ptr<Arrival> unseen(int64_t seen, int64_t depth, int64_t not_before) const;
   void await(Core& core, std::unique_lock<std::mutex>& lock, Duration timeout,
              const std::function<bool()>& ready);
   TypeMismatch mismatch(int64_t fingerprint) const;
@@ -90,12 +93,13 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   std::mutex mutex_;  // what follows
   std::condition_variable news_;
   std::shared_ptr<Arrival> newest_;
-  std::deque<std::shared_ptr<Arrival>> kept_;  // for around(), the newest last
+  std::deque<std::shared_ptr<Arrival>> kept_;  // for around() and read(), the newest last
   size_t kept_bytes_ = 0;
-  int64_t count_ = 0;  // samples that came or were lost
+  size_t least_kept_ = 1;  // the largest depth so far
+  int64_t count_ = 0;      // samples that came or were lost
   std::optional<int64_t> last_utime_;
   std::vector<std::thread::id> waiting_;  // for a sample
-  std::atomic<int64_t> last_read_{0}, last_skipped_{0};
+  std::atomic<int64_t> last_read_{0}, last_skipped_{0}, depth_{1};
   std::exception_ptr fault_;
 };
 

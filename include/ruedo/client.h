@@ -4,6 +4,10 @@
 /// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
 /// microseconds. Everything here is safe to use from any thread. Link with ruedo::client.
 ///
+/// What cannot be done throws: Error and what derives from it, std::invalid_argument for a bad
+/// argument. What may be absent in good order is a std::optional. Nothing returns a code. A
+/// Duration is any of std::chrono's, or a number of seconds.
+///
 /// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed,
 /// destroyed or moved from, whatever needs the server throws NoServer ("this simulation was
 /// closed"). So it does in the child of a fork, which connects for itself.
@@ -26,12 +30,14 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "ruedo/client_map.h"
 #include "ruedo/client_markers.h"
 #include "ruedo/client_requests.h"
 #include "ruedo/client_samples.h"
+#include "ruedo/setting.h"
 
 /// The client of a running simulation.
 namespace ruedo::client {
@@ -122,13 +128,12 @@ class [[nodiscard]] Subscription {
   std::shared_ptr<CallbackCore> core_;
 };
 
-template <class SampleType>
-class Stream;
-
 /// Goes through the samples of a stream, from the next one on, until the run ends:
-/// `for (const Scan& scan : robot.lrf())`. A loop slower than the stream gets the newest each time.
+/// `for (const Scan& scan : robot.lrf())`. A loop slower than the stream gets the newest each time,
+/// or the oldest of the stream's queue_depth().
+/// @tparam StreamType a Stream or MessageStream
 /// @tparam SampleType of the stream
-template <class SampleType>
+template <class StreamType, class SampleType>
 class SampleIterator {
  public:
   /// @cond
@@ -138,7 +143,7 @@ class SampleIterator {
   using pointer = const SampleType*;
   using reference = const SampleType&;
   SampleIterator() = default;  // the end
-  explicit SampleIterator(const Stream<SampleType>& stream) : stream_(&stream) { ++*this; }
+  explicit SampleIterator(const StreamType& stream) : stream_(&stream) { ++*this; }
   const SampleType& operator*() const { return *sample_; }
   const SampleType* operator->() const { return &*sample_; }
   SampleIterator& operator++() {
@@ -155,7 +160,7 @@ class SampleIterator {
   /// @endcond
 
  private:
-  const Stream<SampleType>* stream_ = nullptr;
+  const StreamType* stream_ = nullptr;
   std::optional<SampleType> sample_;
 };
 
@@ -171,12 +176,16 @@ class Stream {
   /// @cond
   explicit Stream(std::shared_ptr<StreamCore> core);
   Stream(const Stream& other)
-      : core_(other.core_), seen_(other.seen_.load()), skipped_(other.skipped_.load()) {}
+      : core_(other.core_),
+        seen_(other.seen_.load()),
+        skipped_(other.skipped_.load()),
+        depth_(other.depth_.load()) {}
   Stream& operator=(const Stream& other) {
     if (this == &other) return *this;
     core_ = other.core_;
     seen_ = other.seen_.load();
     skipped_ = other.skipped_.load();
+    depth_ = other.depth_.load();
     return *this;
   }
   /// @endcond
@@ -189,9 +198,10 @@ class Stream {
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   [[nodiscard]] SampleType latest(Duration timeout = 5.0) const;
-  /// The newest sample that neither latest() nor next() of this object has returned yet; waits for
-  /// one. After Motion::wait() in the same thread it is one from the end of that motion or later. A
-  /// reader slower than the rate skips samples, which dropped() counts; on_sample() skips none.
+  /// The newest sample that neither latest() nor next() of this object has returned yet, or of the
+  /// newest queue_depth() the oldest; waits for one. After Motion::wait() in the same thread it is
+  /// one from the end of that motion or later. A reader slower than the rate skips samples, which
+  /// dropped() counts; on_sample() skips none.
   /// @param timeout of real time
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
@@ -211,8 +221,12 @@ class Stream {
   void subscribe() const;
   /// @endcond
   /// @return its samples, from the next one on
-  SampleIterator<SampleType> begin() const { return SampleIterator<SampleType>(*this); }
-  SampleIterator<SampleType> end() const { return {}; }  ///< @return where the run has ended
+  SampleIterator<Stream, SampleType> begin() const {
+    return SampleIterator<Stream, SampleType>(*this);
+  }
+  SampleIterator<Stream, SampleType> end() const {
+    return {};
+  }  ///< @return where the run has ended
   /// Calls back for every sample from now on. All callbacks of a simulation run in one thread of
   /// their own, one at a time, in the order in which the samples came; in lockstep those of the
   /// steps of step() return before it does. A server that launch() started waits for them. With
@@ -228,12 +242,22 @@ class Stream {
   /// samples came. A new Stream goes on from where the channel was last read, with its count.
   /// @return samples
   int64_t dropped() const;
+  /// How many samples wait for next() and loops, from 1 (the newest alone, from which a channel
+  /// starts) to 1000. With more, next() returns the oldest that waits; where more than that came
+  /// meanwhile, the oldest go, and dropped() counts them.
+  /// @return samples
+  int64_t queue_depth() const { return depth_; }
+  /// Also of streams of this channel that are made from now on.
+  /// @param depth samples
+  /// @throws std::invalid_argument
+  void set_queue_depth(int64_t depth);
 
  private:
   std::shared_ptr<StreamCore> core_;
   mutable std::atomic<int64_t>
-      seen_;  ///< of the samples of the channel, the newest that a call has returned
+      seen_;  ///< of the samples of the channel, the last that a call has returned
   mutable std::atomic<int64_t> skipped_;
+  std::atomic<int64_t> depth_;
 };
 
 /// A stream of messages of a type of one's own: `robot.stream<thermometer_t>("temp")`.
@@ -272,9 +296,23 @@ class MessageStream {
       callback(decoded(name, raw.bytes));
     });
   }
+  /// @return its messages, from the next one on
+  SampleIterator<MessageStream, Message> begin() const {
+    return SampleIterator<MessageStream, Message>(*this);
+  }
+  SampleIterator<MessageStream, Message> end() const {  ///< @return where the run has ended
+    return {};
+  }
   /// As Stream::dropped().
   /// @return messages
   int64_t dropped() const { return raw_.dropped(); }
+  /// As Stream::queue_depth().
+  /// @return messages
+  int64_t queue_depth() const { return raw_.queue_depth(); }
+  /// As Stream::set_queue_depth().
+  /// @param depth messages
+  /// @throws std::invalid_argument
+  void set_queue_depth(int64_t depth) { raw_.set_queue_depth(depth); }
 
   /// @param channel names it in the error
   /// @param bytes LCM's encoding
@@ -636,9 +674,15 @@ class Robot {
   Device<ForceTorque> force_torque() const;   ///< @return the force-torque sensor
   Device<LogicalCamera> logical_camera() const;  ///< @return the logical camera
   Camera camera() const;                         ///< @return the camera
-  Device<Imu> imu() const;                       ///< @return the inertial unit
-  Device<Contact> contact() const;               ///< @return the bumper
+  Device<Boxes2D> boxes_2d() const;  ///< @return the camera that boxes what is in its picture
+  Device<Boxes3D> boxes_3d() const;  ///< @return the camera that boxes what is before it
+  Device<Imu> imu() const;           ///< @return the inertial unit
+  Device<Contact> contact() const;   ///< @return the bumper
   /// @}
+  /// @param name of a camera ("left")
+  /// @return the camera, with its depth, labels and intrinsics
+  /// @throws as device()
+  [[nodiscard]] Camera camera(const std::string& name) const;
   /// @return what it runs into, and what blocks it; it needs no bumper
   /// @throws UnknownName, NoServer
   Stream<Collisions> collisions() const;
@@ -991,21 +1035,21 @@ struct LaunchOptions {
   /// the server, unless the environment's RUEDO names one; "": by the PATH, or above this program
   std::string program = detail::program_beside(__FILE__);
 #endif
-  int64_t seed = -1;                       ///< -1: the server's default
-  double rate = 1.0;                       ///< sim time per real time; kFast: as fast as it goes
-  int lockstep = 0;                        ///< how many clients the run waits for
-  std::vector<std::string> spawn;          ///< models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
-  std::vector<std::string> disable;        ///< devices that are left out: "p3at/camera"
-  std::map<std::string, std::string> set;  ///< {{"p3at/lrf.rate", "20"}}
-  bool noise = true;                       ///< false: ideal values
-  double duration = kForever;              ///< s of sim time after which the run ends
-  bool paused = false;                     ///< it starts so, at step 0
-  std::string record;                      ///< file of a log; "": none
-  std::string snapshots;                   ///< folder for snapshot() and restore(); "": none
-  std::vector<std::string> drive;          ///< by wheel joints: "rover=left_joint,right_joint"
-  std::vector<std::string> fault;          ///< what goes wrong: "p3at/lrf:freeze@3"
-  std::vector<std::string> plugin;         ///< shared libraries with sensors or drives
-  std::vector<std::string> wait_for;       ///< where a command is due: "p3at/velocity@10"
+  int64_t seed = -1;                        ///< -1: the server's default
+  double rate = 1.0;                        ///< sim time per real time; kFast: as fast as it goes
+  int lockstep = 0;                         ///< how many clients the run waits for
+  std::vector<std::string> spawn;           ///< models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
+  std::vector<std::string> disable;         ///< devices that are left out: "p3at/camera"
+  std::map<std::string, Setting> settings;  ///< {{"p3at/lrf.update_rate", 20}}
+  bool noise = true;                        ///< false: ideal values
+  Duration duration = kForever;             ///< of sim time, after which the run ends
+  bool paused = false;                      ///< it starts so, at step 0
+  std::string record;                       ///< file of a log; "": none
+  std::string snapshots;                    ///< folder for snapshot() and restore(); "": none
+  std::vector<std::string> drive;           ///< by wheel joints: "rover=left_joint,right_joint"
+  std::vector<std::string> fault;           ///< what goes wrong: "p3at/lrf:freeze@3"
+  std::vector<std::string> plugin;          ///< shared libraries with sensors or drives
+  std::vector<std::string> wait_for;        ///< where a command is due: "p3at/velocity@10"
   std::string text;               ///< the world's SDF or URDF itself, where the world is ""
   std::vector<std::string> args;  ///< further options of `ruedo run`
   std::string url;                ///< "": a local socket, which no other user of the machine

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 namespace ruedo::client {
@@ -51,6 +52,11 @@ class Map {
   /// @return m to where the ray enters an occupied cell; +inf where it meets none within max_range,
   /// 0 from within one. Goes from cell to cell (Amanatides and Woo 1987)
   [[nodiscard]] double ray(double x, double y, double angle, double max_range = 30.0) const;
+  const Origin& origin() const { return origin_; }  ///< @return of the first cell's corner
+  /// Writes NAME.yaml and NAME.pgm, as map_server of ROS reads them.
+  /// @param path NAME.yaml
+  /// @throws std::invalid_argument for another name; Error for what cannot be written
+  void save(const std::string& path) const;
 
  private:
   void to_cells(double x, double y, double& column, double& row) const;
@@ -61,5 +67,12 @@ class Map {
   double resolution_;
   Origin origin_;
 };
+
+/// Reads what `ruedo map`, Map::save() and map_server of ROS write: NAME.yaml, and the PGM that it
+/// names.
+/// @param path NAME.yaml
+/// @return the map
+/// @throws Error, which names the file and what is wrong with it
+Map load_map(const std::string& path);
 
 }  // namespace ruedo::client

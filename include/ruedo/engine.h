@@ -19,12 +19,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "ruedo/errors.h"
+#include "ruedo/setting.h"
 
 namespace ruedo {
 
@@ -35,12 +37,12 @@ struct EngineOptions {
   bool noise = true;  ///< false: sensors give their ideal values
   int threads = 0;    ///< at most so many cores; 0: all
   std::string text;   ///< the world itself, as SDF or URDF; the name is then what it is called
-  std::vector<std::string> spawn;    ///< "p3at:guest@1,2,0.5"
-  std::vector<std::string> drive;    ///< "rover=left_joint,right_joint"
-  std::vector<std::string> set;      ///< "p3at/LRF.update_rate=10"
-  std::vector<std::string> disable;  ///< "p3at/camera"
-  std::vector<std::string> fault;    ///< "p3at/lrf:freeze@3"
-  std::vector<std::string> plugins;  ///< files: sensors and drives of your own
+  std::vector<std::string> spawn;           ///< "p3at:guest@1,2,0.5"
+  std::vector<std::string> drive;           ///< "rover=left_joint,right_joint"
+  std::map<std::string, Setting> settings;  ///< {{"p3at/LRF.update_rate", 10}}
+  std::vector<std::string> disable;         ///< "p3at/camera"
+  std::vector<std::string> fault;           ///< "p3at/lrf:freeze@3"
+  std::vector<std::string> plugins;         ///< files: sensors and drives of your own
 };
 
 /// A sensor of a robot.

@@ -2,6 +2,7 @@
 and the expected numbers follow from the worlds below.
 """
 
+import itertools
 import math
 import subprocess
 import sys
@@ -129,6 +130,7 @@ def test_streams_are_joined_by_stamp_and_loops_keep_time(language):
         said = api(language, server.url, "in_step")
     assert said.words("joined")[0] == "10" and float(said.words("joined")[1]) == 0.0
     assert said.words("joined")[2] == "True"
+    assert said.numbers("three") == [0, 0, 0]  # poses and odometry come each 20 ms
     offset, error, moved = said.words("between")
     assert (offset, moved) == ("-7000", "True") and float(error) == pytest.approx(0.0, abs=1e-9)
     assert said.numbers("nearest") == [100_000]
@@ -214,7 +216,7 @@ def test_fixes_in_metres_and_headings(language, tmp_path):
     assert said.one("none").startswith("UnknownName: here has no magnetometer; it has ")
 
 
-def test_a_log_that_is_played_feeds_the_program_that_drove(tmp_path):
+def test_a_log_that_is_played_feeds_the_program_that_drove(language, tmp_path):
     """connect() works on it; what would change the run is refused; its end is the run's."""
     import ruedo
 
@@ -225,17 +227,115 @@ def test_a_log_that_is_played_feeds_the_program_that_drove(tmp_path):
         sim.sleep(1.0)
         reached = robot.pose.latest().x
     url = free_url()
-    with Server([RUEDO, "play", log, "--lcm", url, "--speed", "4", "--wait"], url):
-        with ruedo.connect(url, timeout=PATIENCE) as sim:
-            robot = sim.robot("p3at")
-            assert sim.world == "hall" and robot.lrf.range_max > 1.0 and sim.url == url
-            with pytest.raises(ruedo.NotSupported):
-                robot.set_velocity(0.1, 0.0)
-            with pytest.raises(ruedo.NotSupported):
-                sim.pause()
-            xs = [pose.x for _, pose in sim.synchronised(robot.lrf, robot.pose)]
-            assert sim.time > 1.0
-            assert xs[-1] == pytest.approx(reached, abs=1e-3) and len(xs) > 10
+    with Server([RUEDO, "play", log, "--lcm", url, "--wait"], url):  # in real time
+        said = api(language, url, "played")
+    assert said.words("world") == ["hall", "True"]
+    assert said.one("drive").startswith("NotSupported: ")
+    assert said.one("pause").startswith("NotSupported: ")
+    count, last, time = said.numbers("went")
+    assert count > 3 and time > 1.0 and last == pytest.approx(reached, abs=1e-3)
+
+
+def test_a_queue_keeps_the_newest_and_counts_the_others(language):
+    """Seven scans, each 100 ms: the first is read, then of six the newest four wait."""
+    with tcp_server("--paused", "--no-noise", "--disable", "p3at/camera") as server:
+        said = api(language, server.url, "queue")
+    assert said.numbers("queue") == [3e5, 4e5, 5e5, 6e5, 2, 4, 4]
+    assert said.numbers("newest") == [9e5, 4]  # of three more the last
+    for depth in (0, 1001):
+        error = said.one(f"depth{depth}")
+        assert error.startswith("ValueError: ") and f"is {depth}; allowed are 1 to 1000" in error
+
+
+def test_every_scan_reaches_a_slow_loop_with_a_queue():
+    """At real time, a loop that is slower than the scanner for a while, and faster after that."""
+    import ruedo
+
+    with ruedo.launch(HALL, noise=False, disable=["p3at/camera"]) as sim:
+        lrf = sim.robot("p3at").lrf.reader(queue_depth=50)
+        newest, stamps = sim.robot("p3at").lrf, []
+        for scan in lrf:
+            stamps.append(scan.utime)
+            if len(stamps) == 3:
+                newest.latest()
+                sim.sleep(1.5)
+                assert newest.next().utime - scan.utime > 1_000_000
+            if len(stamps) == 15:
+                break
+        assert lrf.dropped == 0 and newest.dropped > 5
+    gaps = {b - a for a, b in itertools.pairwise(stamps)}
+    assert gaps == {100_000}
+
+
+PIXELS = bytes([0, 254, 205, 77, 76, 255, 128, 0, 254, 254, 0, 0])  # from the top
+HEAD = b"P5 # a comment\n# another\n4 3\n255\n"
+MAP_FILES = {
+    "given": "# of a room\nimage: 'given.pgm'\nmode: trinary\nresolution: 0.05  # m\norigin:\n- -1.5\n- 2\n- 1e-3\n"
+    "negate: 0\noccupied_thresh: 0.7\nfree_thresh: 0.2\n",
+    "missing": "image: given.pgm\n",
+    "resolution": "image: given.pgm\nresolution: 0\norigin: [0, 0, 0]\n",
+    "origin": "image: given.pgm\nresolution: 0.1\norigin: [0, 0]\n",
+    "short": "image: short.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n",
+    "picture": "image: picture.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n",
+}
+
+
+def test_maps_are_read_and_written(language, tmp_path):
+    """Occupied where more than 0.7 of 255 is missing, free where less than 0.2 is."""
+    import ruedo
+
+    for name, text in MAP_FILES.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    (tmp_path / "given.pgm").write_bytes(HEAD + PIXELS)
+    (tmp_path / "short.pgm").write_bytes(HEAD + PIXELS[1:])
+    (tmp_path / "picture.pgm").write_bytes(b"nothing of the kind")
+    with ruedo_run("--paused", "--disable", "p3at/camera", world=HALL) as server:
+        said = api(language, server.url, "map_files", str(tmp_path))
+    assert said.numbers("map") == [3, 4, 0.05, -1.5, 2.0, 0.001]
+    assert said.numbers("cells") == [0, 0, 100, 100, 100, 0, -1, 100, 100, 0, 0, -1]
+    saved = ruedo.load_map(tmp_path / "saved.yaml")
+    assert saved.cells.ravel().tolist() == said.numbers("cells")
+    assert saved.origin == (-1.5, 2.0, 0.001) and saved.resolution == 0.05
+    assert said.one("name").startswith("ValueError: ") and "ends in .yaml" in said.one("name")
+    for what, words in (
+        ("none", "none.yaml"),
+        ("missing", "missing.yaml: resolution, origin is missing"),
+        ("resolution", "resolution.yaml: resolution is "),
+        ("origin", "origin.yaml: origin is "),
+        ("short", "short.pgm: a PGM of 8 bits with 4 x 3 pixels is wanted, and 11 bytes are there"),
+        ("picture", "picture.pgm"),
+    ):
+        assert words in said.one(what)
+
+
+def camera(name, type, more, after=""):
+    return (
+        f"<sensor name='{name}' type='{type}'><update_rate>5</update_rate>{after}<camera><horizontal_fov>1.5707963267948966"
+        f"</horizontal_fov><image><width>{200 if name == 'right' else 100}</width><height>100</height></image>"
+        f"<clip><near>0.05</near><far>50</far></clip>{more}</camera></sensor>"
+    )
+
+
+def test_devices_of_a_kind_by_their_names(language, tmp_path):
+    """A crate 4.5 m ahead of a rig of four cameras."""
+    depth = "<ruedo:depth>true</ruedo:depth>"
+    (tmp_path / "rig.sdf").write_text(
+        "<sdf version='1.9' xmlns:ruedo='urn:ruedo'><world name='w'><model name='crate'><static>true</static>"
+        "<pose>5 0 1 0 0 0</pose><plugin filename='gz-sim-label-system' name='gz::sim::systems::Label'><label>7</label>"
+        "</plugin><link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry></visual></link>"
+        "</model><model name='rig'><static>true</static><pose>0 0 1 0 0 0</pose><link name='link'>"
+        + camera("left", "camera", "")
+        + camera("right", "camera", "", depth)
+        + camera("flat", "boundingbox", "<box_type>2d</box_type>")
+        + camera("solid", "boundingbox", "<box_type>3d</box_type>")
+        + "</link></model></world></sdf>"
+    )
+    with ruedo_run("--no-noise", world=str(tmp_path / "rig.sdf")) as server:
+        said = api(language, server.url, "devices_by_name")
+    assert said.numbers("width") == [200] and said.numbers("depth") == [200]
+    assert said.words("boxes") == ["crate", "7"]
+    assert said.words("solid")[0] == "crate"
+    assert [float(one) for one in said.words("solid")[1:]] == pytest.approx([5.0, 0.0, 0.0])
 
 
 def test_launch_has_options_by_name_and_suggests(tmp_path):

@@ -171,6 +171,19 @@ def test_arguments_are_the_same_words_in_every_language(language, as_text):
     assert ahead == pytest.approx(python.numbers("scans")[1], abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    "words, suggestion",
+    [
+        (["--set", "p3at/lrf.update_rat=20"], "did you mean 'update_rate'?"),
+        (["--disable", "p3at/camra"], "did you mean 'camera'?"),
+        (["--lockstpe", "1"], "did you mean '--lockstep'?"),
+    ],
+)
+def test_an_unknown_option_is_an_error_with_a_suggestion(language, words, suggestion):
+    failed = probe(language, "-", "launch", HALL, *words).one("failed")
+    assert failed.startswith("LaunchError: ") and suggestion in failed
+
+
 def test_a_world_or_its_text_is_needed(language):
     if language == "python":  # there it is a TypeError
         return

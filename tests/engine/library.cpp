@@ -40,9 +40,10 @@ void look(const std::string& world) {
   options.worlds = 2;
   options.noise = false;
   options.disable = {"p3at/camera"};
-  options.set = {"p3at/LRF.update_rate"};
-  expect_error<ruedo::InputError>([&] { ruedo::Engine(world, options); }, "ROBOT/DEVICE.KEY=VALUE");
-  options.set = {};
+  options.settings = {{"p3at/LRF.update_rat", 10}};
+  expect_error<ruedo::InputError>([&] { ruedo::Engine(world, options); },
+                                  "did you mean 'update_rate'?");
+  options.settings = {};
   ruedo::Engine made(world, options);
   ruedo::Engine engine = std::move(made);
   expect(engine.worlds() == 2 && engine.step_size() == 0.005, "worlds and steps");

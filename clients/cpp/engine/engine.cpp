@@ -29,7 +29,8 @@ world::LoadOptions load_options(const EngineOptions& options) {
   world::LoadOptions load;
   for (const std::string& text : options.spawn) load.spawns.push_back(world::parse_spawn(text));
   for (const std::string& text : options.drive) load.drives.push_back(world::parse_drive(text));
-  for (const std::string& text : options.set) load.settings.push_back(world::parse_setting(text));
+  for (const auto& [key, value] : options.settings)
+    load.settings.push_back(world::parse_setting(key + "=" + value.text()));
   for (const std::string& text : options.fault) load.faults.push_back(world::parse_fault(text));
   load.disabled = options.disable;
   return load;

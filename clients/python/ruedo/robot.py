@@ -24,6 +24,8 @@ from .samples import (
     AirPressure,
     AirSpeed,
     Altimeter,
+    Boxes2D,
+    Boxes3D,
     CameraInfo,
     Collisions,
     Contact,
@@ -94,14 +96,17 @@ class Camera(Device[Image]):
 
     @property
     def depth(self) -> Stream[Image]:
+        """Pictures of depth: "float32", m along the optical axis. Raises UnknownName for none."""
         return self._part("depth")
 
     @property
     def labels(self) -> Stream[Image]:
+        """Pictures of labels: "gray16", body index + 1. Raises UnknownName for none."""
         return self._part("labels")
 
     @property
     def intrinsics(self) -> Stream[CameraInfo]:
+        """Its pinhole model. Raises UnknownName for none."""
         return self._part("info")
 
     def _part(self, part: str) -> Stream[Any]:
@@ -142,14 +147,17 @@ class Robot:
 
     @property
     def model(self) -> str:
+        """Name of the model that it was made of."""
         return str(self._info.model)
 
     @property
     def drive(self) -> str:
+        """ "kinematic", "wheels", ...; "" for a robot that only senses."""
         return str(self._info.drive)
 
     @property
     def wheel_radius(self) -> float:
+        """m."""
         return float(self._info.wheel_radius)
 
     @property
@@ -169,10 +177,12 @@ class Robot:
 
     @property
     def watchdog(self) -> float:
+        """s of sim time without a command after which it stops; 0: never."""
         return float(self._info.watchdog_us) * 1e-6
 
     @property
     def wheels(self) -> list[str]:
+        """Names of the wheel joints."""
         return list(self._info.wheels)
 
     # Its devices.
@@ -215,6 +225,7 @@ class Robot:
 
     @property
     def odometry(self) -> Device[Odometry]:
+        """Wheel odometry."""
         return self._first("odometry_t", "odometry")
 
     @property
@@ -230,7 +241,23 @@ class Robot:
         return camera
 
     @property
+    def cameras(self) -> dict[str, Camera]:
+        """All cameras, by their names: ``robot.cameras["left"].depth``."""
+        return {one.name: one for one in self.devices if isinstance(one, Camera)}
+
+    @property
+    def boxes_2d(self) -> Device[Boxes2D]:
+        """The first camera that boxes what it sees in its picture."""
+        return self._first("boxes_2d_t", "bounding box camera")
+
+    @property
+    def boxes_3d(self) -> Device[Boxes3D]:
+        """The first camera that boxes what it sees in space."""
+        return self._first("boxes_3d_t", "bounding box camera in space")
+
+    @property
     def imu(self) -> Device[Imu]:
+        """The first inertial measurement unit."""
         return self._first("imu_t", "IMU")
 
     @property
@@ -240,10 +267,12 @@ class Robot:
 
     @property
     def magnetometer(self) -> Device[Magnetometer]:
+        """The first magnetometer."""
         return self._first("magnetometer_t", "magnetometer")
 
     @property
     def altimeter(self) -> Device[Altimeter]:
+        """The first altimeter."""
         return self._first("altimeter_t", "altimeter")
 
     @property
@@ -258,10 +287,12 @@ class Robot:
 
     @property
     def force_torque(self) -> Device[ForceTorque]:
+        """The first force-torque sensor."""
         return self._first("force_torque_t", "force-torque sensor")
 
     @property
     def logical_camera(self) -> Device[LogicalCamera]:
+        """The first logical camera."""
         return self._first("logical_camera_t", "logical camera")
 
     @property

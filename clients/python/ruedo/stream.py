@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bisect
 import contextlib
+import itertools
 import math
 import struct
 import threading
@@ -33,7 +34,8 @@ _UTIME = struct.Struct(">q")
 _UTIME_AT = 8  # behind the fingerprint, in all of the server's own types
 _MOST_LOST = 1_000_000_000  # in one gap: a false time may make it any
 _LOOK_SECONDS = 0.5  # for the server, while nothing comes
-_MOST_KEPT, _MOST_KEPT_BYTES = 256, 4 << 20  # of what came before, for at()
+_MOST_KEPT, _MOST_KEPT_BYTES = 256, 4 << 20  # of what came before, where no depth is larger
+MOST_DEPTH = 1000
 _MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps tell no more than that
 
 
@@ -62,10 +64,23 @@ def form_of(message: Any) -> Form:
 class Reader(Generic[T]):
     """Reads a stream at a pace of its own, which other readers of the stream do not change."""
 
-    def __init__(self, stream: Stream[T]):
+    def __init__(self, stream: Stream[T], queue_depth: int = 1):
         self._stream = stream
-        self._seen = 0  # of the samples of the stream, the newest that a call has returned
+        self._seen = 0  # of the samples of the stream, the last that a call has returned
         self._skipped = 0
+        self._depth = whole("queue_depth", queue_depth, 1, MOST_DEPTH)
+
+    @property
+    def queue_depth(self) -> int:
+        """How many samples wait for next() and loops, from 1 (the newest alone, from which a stream
+        starts) to 1000. With more, next() returns the oldest that waits; where more than that
+        came meanwhile, the oldest go, and `dropped` counts them."""
+        return self._depth
+
+    @queue_depth.setter
+    def queue_depth(self, queue_depth: int) -> None:
+        self._depth = whole("queue_depth", queue_depth, 1, MOST_DEPTH)
+        self._stream._keep_at_least(self._depth)
 
     @property
     def dropped(self) -> int:
@@ -80,10 +95,10 @@ class Reader(Generic[T]):
         return self._stream._sample_for(self, False, timeout)
 
     def next(self, timeout: float = 5.0) -> T:
-        """The newest sample that neither latest() nor next() has returned yet; waits for one, at
-        most timeout seconds of real time. After wait() of a motion it is one from its end or later.
-        A reader slower than the rate skips samples, which `dropped` counts; on_sample() skips
-        none."""
+        """The newest sample that neither latest() nor next() has returned yet, or of the newest
+        `queue_depth` the oldest; waits for one, at most timeout seconds of real time. After wait()
+        of a motion it is one from its end or later. A reader slower than the rate skips samples,
+        which `dropped` counts; on_sample() skips none."""
         return self._stream._sample_for(self, True, timeout)
 
     def __iter__(self) -> Iterator[T]:
@@ -122,11 +137,12 @@ class Reader(Generic[T]):
 class _Arrival:
     """A message of a stream."""
 
-    __slots__ = ("_sample", "_stream", "data", "utime")
+    __slots__ = ("_sample", "_stream", "data", "number", "utime")
 
     def __init__(self, stream: Stream[Any], data: bytes, utime: int | None):
         self._stream, self.data = stream, data
         self.utime = utime  # us; None: its type does not say
+        self.number = 0  # of the samples of the stream, with those that were lost
         self._sample: Any = None
 
     def sample(self) -> Any:
@@ -170,6 +186,7 @@ class Stream(Reader[T]):
         self._source: Subscription | None = None
         self._newest: _Arrival | None = None
         self._kept: deque[_Arrival] = deque()  # the newest last
+        self._least_kept = 1  # the largest depth of a reader
         self._kept_bytes = 0
         self._count = 0  # samples that came or were lost
         self._last_utime: int | None = None  # us
@@ -189,9 +206,15 @@ class Stream(Reader[T]):
         lost on the way; and how many a callback did not get, which was slower than they came."""
         return self._skipped + self._missed
 
-    def reader(self) -> Reader[T]:
-        """A reader that has seen nothing yet."""
-        return Reader(self)
+    def reader(self, queue_depth: int = 1) -> Reader[T]:
+        """A reader that has seen nothing yet, with a `queue_depth` of its own."""
+        made = Reader(self, queue_depth)
+        self._keep_at_least(made.queue_depth)
+        return made
+
+    def _keep_at_least(self, count: int) -> None:
+        with self._news:
+            self._least_kept = max(self._least_kept, count)
 
     def on_sample(self, callback: Callable[[T], None]) -> Subscription:
         """Calls callback(sample) for every sample from now on, until close() of what it returns (or
@@ -258,8 +281,9 @@ class Stream(Reader[T]):
         not_before, me = connection.not_before(), threading.get_ident()
         with self._news:
             self._raise_fault()
-            if self._serves(reader, True, not_before):
-                return self._taken(reader)
+            arrival = self._for(reader, True, not_before)
+            if arrival:
+                return self._taken(reader, arrival)
             connection.progress.wait()
             if me not in self._waiting:
                 self._waiting.append(me)
@@ -271,13 +295,12 @@ class Stream(Reader[T]):
             fault, self._fault = self._fault, None
             raise fault
 
-    def _taken(self, reader: Reader[T]) -> _Arrival:
-        """The newest one. With the lock held."""
-        assert self._newest is not None
+    def _taken(self, reader: Reader[T], arrival: _Arrival) -> _Arrival:
+        """With the lock held."""
         if reader._seen:
-            reader._skipped += max(0, self._count - reader._seen - 1)
-        reader._seen = self._count
-        return self._newest
+            reader._skipped += max(0, arrival.number - reader._seen - 1)
+        reader._seen = arrival.number
+        return arrival
 
     def _subscribe(self) -> None:
         self._connection.check_open()
@@ -376,27 +399,30 @@ class Stream(Reader[T]):
             connection.clock.note(utime)
         with self._news:
             self._newest, self._fault = arrival, None
-            self._keep(arrival)
             self._count += 1 + self._lost_before(utime)
+            arrival.number = self._count
+            self._keep(arrival)
             if self._waiting:
                 connection.progress.use(connection.clock.utime, tuple(self._waiting))
                 self._waiting.clear()
             self._news.notify_all()
-        self._arrivals.call(sample)
+        if sample is not None:  # else somebody has begun to listen just now
+            self._arrivals.call(sample)
         if self._callbacks:
             for stream in connection.callbacks.put(arrival.call_back, self, len(data)):
                 stream._missed += 1
 
     def _keep(self, arrival: _Arrival) -> None:
-        """For at(). With the lock held."""
-        if arrival.utime is None:
-            return
-        if self._kept and arrival.utime < (self._kept[-1].utime or 0):  # sim time was reset
+        """For at(), and for readers with a depth. With the lock held."""
+        before = self._kept[-1].utime if self._kept else None
+        if before is not None and (arrival.utime or 0) < before:  # sim time was reset
             self._kept.clear()
             self._kept_bytes = 0
         self._kept.append(arrival)
         self._kept_bytes += len(arrival.data)
-        while len(self._kept) > _MOST_KEPT or self._kept_bytes > _MOST_KEPT_BYTES:
+        while len(self._kept) > self._least_kept and (
+            len(self._kept) > _MOST_KEPT or self._kept_bytes > _MOST_KEPT_BYTES
+        ):
             self._kept_bytes -= len(self._kept.popleft().data)
 
     def _lost_before(self, utime: int | None) -> int:
@@ -418,8 +444,10 @@ class Stream(Reader[T]):
         connection.bus.catch_up()
         not_before = connection.not_before() if a_new_one else None
         with self._news:
-            self._await(lambda: self._serves(reader, a_new_one, not_before), timeout)
-            arrival = self._taken(reader)
+            self._await(lambda: self._for(reader, a_new_one, not_before) is not None, timeout)
+            found = self._for(reader, a_new_one, not_before)
+            assert found is not None
+            arrival = self._taken(reader, found)
         connection.note_use()
         try:
             sample: T = arrival.sample()
@@ -430,14 +458,18 @@ class Stream(Reader[T]):
                     self._newest = None
             raise
 
-    def _serves(self, reader: Reader[T], a_new_one: bool, not_before: int | None) -> bool:
-        """Whether the newest sample is what the reader wants. With the lock held."""
-        newest = self._newest
-        if newest is None or not a_new_one:
-            return newest is not None
-        if reader._seen == self._count:
-            return False
-        return not_before is None or newest.utime is None or newest.utime >= not_before
+    def _for(self, reader: Reader[T], a_new_one: bool, not_before: int | None) -> _Arrival | None:
+        """What the reader gets, if that has come. With the lock held."""
+        if not a_new_one:
+            return self._newest
+        found = None
+        for arrival in itertools.islice(reversed(self._kept), reader._depth):
+            if arrival.number <= reader._seen:
+                break
+            if not_before is not None and arrival.utime is not None and arrival.utime < not_before:
+                break
+            found = arrival
+        return found
 
     def _await(self, ready: Callable[[], bool], timeout: float) -> None:
         """With the lock held."""
@@ -509,7 +541,7 @@ def synchronised(first: Stream[Any], others: tuple[Stream[Any], ...]) -> Iterato
     """Samples of the first stream, each with those of the others at its stamp."""
     for other in others:
         other._subscribe()
-    for sample in first.reader():
+    for sample in first.reader(first.queue_depth):
         try:
             joined = [other._at(sample.utime, 5.0) for other in others]
         except RunEnded:

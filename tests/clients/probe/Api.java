@@ -1,10 +1,14 @@
 import ruedo.Body;
+import ruedo.Boxes2D;
+import ruedo.Boxes3D;
+import ruedo.Device;
 import ruedo.Joint;
 import ruedo.JointMode;
 import ruedo.Joints;
 import ruedo.NavSat;
 import ruedo.Observations;
 import ruedo.OccupancyMap;
+import ruedo.Odometry;
 import ruedo.Pose;
 import ruedo.Robot;
 import ruedo.Ruedo;
@@ -14,12 +18,14 @@ import ruedo.Simulation;
 import ruedo.State;
 import ruedo.Synchronised;
 import ruedo.Transform;
+import ruedo.Twist;
 import ruedo.lcmtypes.velocity_command_t;
 
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Locale;
 import java.util.Map;
+import java.util.concurrent.atomic.AtomicInteger;
 
 /**
  * What textbook programs use of the client, in Java; api.py and api.cpp are its twins, with the
@@ -110,6 +116,13 @@ public final class Api {
             if (stamps.size() == 10) break;
         }
         say("joined", stamps.size(), worst, rising);
+        for (Synchronised<Scan, Pose> all :
+                sim.synchronised(robot.lrf(), robot.pose(), robot.odometry())) {
+            long stamp = all.get(robot.lrf()).utime;
+            Odometry odometry = all.get(robot.odometry());
+            say("three", all.first.utime - stamp, all.second.utime - stamp, odometry.utime - stamp);
+            break;
+        }
         long last = stamps.get(stamps.size() - 1);
         Pose between = robot.pose().at(last - 7000); // poses come each 20 ms
         Pose before = robot.pose().at(last - 20000);
@@ -144,15 +157,90 @@ public final class Api {
         say("ended", rest < 1000, ticks < 1000);
     }
 
+    /** Paused; a scan each 20 steps. */
+    private static void queue(Simulation sim) {
+        Device<Scan> lrf = sim.robot("p3at").lrf();
+        AtomicInteger came = new AtomicInteger();
+        lrf.onSample(scan -> came.incrementAndGet());
+        lrf.setQueueDepth(4);
+        sim.step(20);
+        waitFor(came, 1);
+        long first = lrf.next(PATIENCE).utime, begin = lrf.dropped();
+        sim.step(120);
+        waitFor(came, 7);
+        List<Object> line = new ArrayList<>(List.of("queue"));
+        for (int i = 0; i < 4; ++i) line.add(lrf.next(PATIENCE).utime - first);
+        line.add(lrf.dropped() - begin);
+        line.add(lrf.queueDepth());
+        line.add(sim.robot("p3at").lrf().queueDepth());
+        say(line.toArray());
+        lrf.setQueueDepth(1);
+        sim.step(60);
+        waitFor(came, 10);
+        say("newest", lrf.next(PATIENCE).utime - first, lrf.dropped() - begin);
+        for (int depth : new int[] {0, 1001})
+            attempt("depth" + depth, () -> lrf.setQueueDepth(depth));
+    }
+
+    private static void waitFor(AtomicInteger came, int count) {
+        while (came.get() < count) Thread.yield();
+    }
+
+    /** A log as a run: what would change it is refused, and it ends. */
+    private static void played(Simulation sim) {
+        Robot robot = sim.robot("p3at");
+        say("world", sim.world(), robot.lrf().rangeMax > 1.0);
+        attempt("drive", () -> robot.setVelocity(0.1, 0.0));
+        attempt("pause", sim::pause);
+        List<Double> xs = new ArrayList<>();
+        for (Synchronised<Scan, Pose> both : sim.synchronised(robot.lrf(), robot.pose()))
+            xs.add(both.second.x());
+        say("went", xs.size(), xs.get(xs.size() - 1), sim.time());
+    }
+
+    private static void mapFiles(String folder) {
+        OccupancyMap map = Ruedo.loadMap(folder + "/given.yaml");
+        byte[][] cells = map.cells();
+        double[] origin = map.origin();
+        say(
+                "map",
+                cells.length,
+                cells[0].length,
+                map.resolution(),
+                origin[0],
+                origin[1],
+                origin[2]);
+        List<Object> line = new ArrayList<>(List.of("cells"));
+        for (byte[] row : cells) for (byte cell : row) line.add((int) cell);
+        say(line.toArray());
+        map.save(folder + "/saved.yaml");
+        attempt("name", () -> map.save(folder + "/saved.png"));
+        for (String wrong : List.of("none", "missing", "resolution", "origin", "short", "picture"))
+            attempt(wrong, () -> Ruedo.loadMap(folder + "/" + wrong + ".yaml"));
+    }
+
+    /** The depth of one camera among several, and the boxes of two. */
+    private static void devicesByName(Simulation sim) {
+        Robot robot = sim.robot("rig");
+        say("width", robot.camera("right").latest(PATIENCE).width);
+        say("depth", robot.camera("right").depth().latest(PATIENCE).width);
+        List<Object> line = new ArrayList<>(List.of("boxes"));
+        for (Boxes2D.Box2D box : robot.boxes2d().latest(PATIENCE).boxes)
+            line.add(box.name + " " + box.label);
+        say(line.toArray());
+        Boxes3D.Box3D box = robot.boxes3d().latest(PATIENCE).boxes.get(0);
+        say("solid", box.name, box.center[0], box.center[1], box.center[2]);
+    }
+
     private static void bodies(Simulation sim) {
         Body crate = sim.body("crate");
         Transform pose = crate.pose();
         say("crate", crate.isStatic, crate.mass, pose.x(), pose.y(), pose.heading());
         crate.setPose(1.0, 2.0, 0.5);
         say("put", crate.pose().x(), crate.pose().y(), crate.pose().heading());
-        crate.setTwist(new double[] {0.0, 0.0, 3.0}, new double[3]);
+        crate.setTwist(new Twist(new double[] {0.0, 0.0, 3.0}, new double[3]));
         sim.step(10);
-        double up = crate.linearVelocity()[2];
+        double up = crate.twist().linear[2];
         say("rises", up < 3.0, up > 1.0, crate.pose().z() > 0.1);
         attempt("unknown", () -> sim.body("crat"));
         say("all", sim.bodies().size() > 1, sim.bodies().get(0).name);
@@ -273,6 +361,18 @@ public final class Api {
                     break;
                 case "saves":
                     saves(sim);
+                    break;
+                case "queue":
+                    queue(sim);
+                    break;
+                case "played":
+                    played(sim);
+                    break;
+                case "map_files":
+                    mapFiles(args[2]);
+                    break;
+                case "devices_by_name":
+                    devicesByName(sim);
                     break;
                 case "fixes":
                     fixes(sim);

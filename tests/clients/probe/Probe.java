@@ -612,7 +612,7 @@ public final class Probe {
                         .lockstep(1)
                         .spawn("p3at:guest@2,0")
                         .disable("p3at/camera", "guest/camera")
-                        .set("p3at/lrf.update_rate", 20)
+                        .setting("p3at/lrf.update_rate", 20)
                         .noise(false)
                         .text(a.length > 1 ? a[1] : "")
                         .timeout(400.0);

@@ -1,6 +1,8 @@
 // What textbook programs use of the client, in C++; api.py and Api.java are its twins, with the
 // same commands and output.
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -8,6 +10,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "ruedo/client.h"
@@ -54,6 +57,8 @@ void attempt(const std::string& what, const std::function<void()>& call) {
     say(what, "RequestError:", error.what());
   } catch (const std::invalid_argument& error) {
     say(what, "ValueError:", error.what());
+  } catch (const rc::Error& error) {
+    say(what, "Error:", error.what());
   }
 }
 
@@ -107,6 +112,11 @@ void in_step(const rc::Simulation& sim) {
     if (stamps.size() == 10) break;
   }
   say("joined", stamps.size(), worst, rising);
+  for (const auto& [scan, pose, odometry] :
+       sim.synchronised(robot.lrf(), robot.pose(), robot.odometry())) {
+    say("three", 0, pose.utime - scan.utime, odometry.utime - scan.utime);
+    break;
+  }
   const int64_t last = stamps.back();
   const rc::Pose between = robot.pose().at(last - 7000);  // poses come each 20 ms
   const rc::Pose before = robot.pose().at(last - 20000), after = robot.pose().at(last);
@@ -131,6 +141,70 @@ void in_step(const rc::Simulation& sim) {
   for (const rc::Scan& scan : robot.lrf()) rest += !scan.ranges.empty();
   for (const double t : sim.every(0.1)) ticks += t > 0.0;
   say("ended", rest < 1000, ticks < 1000);
+}
+
+// Paused; a scan each 20 steps.
+void queue(const rc::Simulation& sim) {
+  rc::Device<rc::Scan> lrf = sim.robot("p3at").lrf();
+  std::atomic<int> came{0};
+  const rc::Subscription counting = lrf.on_sample([&](const rc::Scan&) { ++came; });
+  lrf.set_queue_depth(4);
+  const auto wait_for = [&](int count) {
+    while (came < count) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  (void)sim.step(20);
+  wait_for(1);
+  const int64_t first = lrf.next(kPatience).utime, begin = lrf.dropped();
+  (void)sim.step(120);
+  wait_for(7);
+  std::string line = "queue";
+  for (int i = 0; i < 4; ++i) line += " " + word(lrf.next(kPatience).utime - first);
+  say(line, lrf.dropped() - begin, lrf.queue_depth(), sim.robot("p3at").lrf().queue_depth());
+  lrf.set_queue_depth(1);
+  (void)sim.step(60);
+  wait_for(10);
+  const int64_t newest = lrf.next(kPatience).utime;
+  say("newest", newest - first, lrf.dropped() - begin);
+  for (const int64_t depth : {0, 1001})
+    attempt("depth" + word(depth), [&] { lrf.set_queue_depth(depth); });
+}
+
+// A log as a run: what would change it is refused, and it ends.
+void played(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("p3at");
+  say("world", sim.world(), robot.lrf().info().range_max > 1.0);
+  attempt("drive", [&] { robot.set_velocity(0.1, 0.0); });
+  attempt("pause", [&] { sim.pause(); });
+  std::vector<double> xs;
+  for (const auto& [scan, pose] : sim.synchronised(robot.lrf(), robot.pose()))
+    xs.push_back(pose.x());
+  say("went", xs.size(), xs.back(), sim.time());
+}
+
+void map_files(const std::string& folder) {
+  const rc::Map map = rc::load_map(folder + "/given.yaml");
+  say("map", map.rows(), map.columns(), map.resolution(), map.origin().x, map.origin().y,
+      map.origin().heading);
+  std::string line = "cells";
+  for (const int8_t cell : map.cells()) line += " " + word(int{cell});
+  say(line);
+  map.save(folder + "/saved.yaml");
+  attempt("name", [&] { map.save(folder + "/saved.png"); });
+  for (const char* wrong : {"none", "missing", "resolution", "origin", "short", "picture"})
+    attempt(wrong, [&] { (void)rc::load_map(folder + "/" + wrong + ".yaml"); });
+}
+
+// The depth of one camera among several, and the boxes of two.
+void devices_by_name(const rc::Simulation& sim) {
+  const rc::Robot robot = sim.robot("rig");
+  say("width", robot.camera("right").latest(kPatience).width);
+  say("depth", robot.camera("right").depth().latest(kPatience).width);
+  std::string line = "boxes";
+  for (const rc::Box2D& box : robot.boxes_2d().latest(kPatience).boxes)
+    line += " " + box.name + " " + word(box.label);
+  say(line);
+  const rc::Box3D box = robot.boxes_3d().latest(kPatience).boxes.at(0);
+  say("solid", box.name, box.center[0], box.center[1], box.center[2]);
 }
 
 void bodies(const rc::Simulation& sim) {
@@ -243,6 +317,10 @@ int main(int argc, char** argv) {
       {"chart", [&] { chart(); }},
       {"saves", [&] { saves(sim); }},
       {"fixes", [&] { fixes(sim); }},
+      {"queue", [&] { queue(sim); }},
+      {"played", [&] { played(sim); }},
+      {"map_files", [&] { map_files(argv[3]); }},
+      {"devices_by_name", [&] { devices_by_name(sim); }},
       {"joints_in_lockstep", [&] { joints_in_lockstep(sim); }},
   };
   commands.at(argv[2])();

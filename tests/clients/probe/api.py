@@ -3,6 +3,7 @@ same commands and output."""
 
 import itertools
 import sys
+import time
 
 import numpy as np
 import ruedo
@@ -18,7 +19,7 @@ def attempt(what, call):
     try:
         call()
         say(what, "none")
-    except (ruedo.RuedoError, ValueError) as error:
+    except (ruedo.RuedoError, ValueError, OSError) as error:
         say(what, f"{type(error).__name__}:", str(error).replace("\n", " "))
 
 
@@ -70,6 +71,8 @@ def in_step(sim):
         if pairs == 10:
             break
     say("joined", pairs, worst, all(b > a for a, b in itertools.pairwise(stamps)))
+    three = next(iter(sim.synchronised(robot.lrf, robot.pose, robot.odometry)))
+    say("three", *(one.utime - three[0].utime for one in three))
     between = robot.pose.at(stamps[-1] - 7_000)  # poses come each 20 ms
     before, after = robot.pose.at(stamps[-1] - 20_000), robot.pose.at(stamps[-1])
     share = 13.0 / 20.0
@@ -90,6 +93,63 @@ def in_step(sim):
     attempt("period", lambda: sim.every(0.0))
     sim.quit()
     say("ended", sum(1 for _ in robot.lrf) < 1000, sum(1 for _ in sim.every(0.1)) < 1000)
+
+
+def queue(sim):
+    """Paused; a scan each 20 steps."""
+    lrf, came = sim.robot("p3at").lrf, []
+    lrf.on_sample(lambda scan: came.append(scan.utime))
+    lrf.queue_depth = 4
+
+    def wait_for(count):
+        while len(came) < count:
+            time.sleep(0.001)
+
+    sim.step(20)
+    wait_for(1)
+    first, begin = lrf.next(PATIENCE).utime, lrf.dropped
+    sim.step(120)
+    wait_for(7)
+    got = [lrf.next(PATIENCE).utime - first for _ in range(4)]
+    say("queue", *got, lrf.dropped - begin, lrf.queue_depth, sim.robot("p3at").lrf.queue_depth)
+    lrf.queue_depth = 1
+    sim.step(60)
+    wait_for(10)
+    say("newest", lrf.next(PATIENCE).utime - first, lrf.dropped - begin)
+    for depth in (0, 1001):
+        attempt(f"depth{depth}", lambda depth=depth: setattr(lrf, "queue_depth", depth))
+
+
+def played(sim):
+    """A log as a run: what would change it is refused, and it ends."""
+    robot = sim.robot("p3at")
+    say("world", sim.world, robot.lrf.range_max > 1.0)
+    attempt("drive", lambda: robot.set_velocity(0.1, 0.0))
+    attempt("pause", sim.pause)
+    xs = [pose.x for _, pose in sim.synchronised(robot.lrf, robot.pose)]
+    say("went", len(xs), xs[-1], sim.time)
+
+
+def map_files(_, folder):
+    map = ruedo.load_map(f"{folder}/given.yaml")
+    rows, columns = map.cells.shape
+    say("map", rows, columns, map.resolution, *map.origin)
+    say("cells", *map.cells.ravel().tolist())
+    map.save(f"{folder}/saved.yaml")
+    attempt("name", lambda: map.save(f"{folder}/saved.png"))
+    for wrong in ("none", "missing", "resolution", "origin", "short", "picture"):
+        attempt(wrong, lambda wrong=wrong: ruedo.load_map(f"{folder}/{wrong}.yaml"))
+
+
+def devices_by_name(sim):
+    """The depth of one camera among several, and the boxes of two."""
+    robot = sim.robot("rig")
+    say("width", robot.cameras["right"].latest(PATIENCE).width)
+    say("depth", robot.cameras["right"].depth.latest(PATIENCE).width)
+    boxes = robot.boxes_2d.latest(PATIENCE).boxes
+    say("boxes", *(f"{box.name} {box.label}" for box in boxes))
+    box = robot.boxes_3d.latest(PATIENCE).boxes[0]
+    say("solid", box.name, *map(float, box.center))
 
 
 def bodies(sim):

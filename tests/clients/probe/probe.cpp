@@ -481,7 +481,7 @@ void launched_with(const std::string& world, const std::string& text) {
   options.lockstep = 1;
   options.spawn = {"p3at:guest@2,0"};
   options.disable = {"p3at/camera", "guest/camera"};
-  options.set = {{"p3at/lrf.update_rate", "20"}};
+  options.settings = {{"p3at/lrf.update_rate", 20}};
   options.noise = false;
   options.text = text;
   options.timeout = 400.0;

@@ -33,14 +33,10 @@ public final class Body {
         return new Transform(state.position, state.orientation);
     }
 
-    /** m/s, in the world. */
-    public double[] linearVelocity() {
-        return sim.state(name).linear;
-    }
-
-    /** rad/s, in the world. */
-    public double[] angularVelocity() {
-        return sim.state(name).angular;
+    /** In the world, as it moves now. */
+    public Twist twist() {
+        State state = sim.state(name);
+        return new Twist(state.linear, state.angular);
     }
 
     /** Puts the model somewhere in the world, at rest. */
@@ -53,8 +49,8 @@ public final class Body {
         setPose(Transform.of(x, y, heading));
     }
 
-    /** Gives the model a velocity (m/s) and a turn rate (rad/s), in the world. */
-    public void setTwist(double[] linear, double[] angular) {
-        sim.setTwist(name, linear, angular);
+    /** Gives the model a twist in the world. */
+    public void setTwist(Twist twist) {
+        sim.setTwist(name, twist.linear, twist.angular);
     }
 }

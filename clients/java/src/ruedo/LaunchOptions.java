@@ -2,6 +2,8 @@ package ruedo;
 
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Map;
+import java.util.TreeMap;
 
 /** How a private server is started. Every setter returns this. */
 public final class LaunchOptions {
@@ -10,7 +12,7 @@ public final class LaunchOptions {
     int lockstep;
     List<String> spawn = List.of();
     List<String> disable = List.of();
-    final List<String> set = new ArrayList<>(); // KEY=VALUE
+    final List<String> settings = new ArrayList<>(); // KEY=VALUE
     final List<String> more = new ArrayList<>(); // as the command line has them
     boolean noise = true;
     String text = "";
@@ -50,10 +52,26 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** A setting beside those that were set before: set("p3at/lrf.rate", 20). */
-    public LaunchOptions set(String key, Object value) {
-        set.add(key + "=" + value);
+    /** A setting beside those that were set before: setting("p3at/lrf.update_rate", 20). */
+    public LaunchOptions setting(String key, Object value) {
+        settings.add(key + "=" + value);
         return this;
+    }
+
+    /** The same of several: settings(Map.of("p3at/lrf.update_rate", 20)). */
+    public LaunchOptions settings(Map<String, ?> values) {
+        new TreeMap<>(values).forEach(this::setting);
+        return this;
+    }
+
+    /**
+     * {@link #setting}.
+     *
+     * @deprecated its name before 1.0
+     */
+    @Deprecated
+    public LaunchOptions set(String key, Object value) {
+        return setting(key, value);
     }
 
     /** False: ideal values. */

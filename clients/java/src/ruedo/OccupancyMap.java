@@ -1,5 +1,7 @@
 package ruedo;
 
+import java.nio.file.Path;
+
 /**
  * An occupancy map: cells by rows, the southernmost first; 0 free, 100 occupied, -1 unknown.
  * Immutable.
@@ -30,6 +32,31 @@ public final class OccupancyMap {
         this.x = x;
         this.y = y;
         this.heading = heading;
+    }
+
+    /** By rows, the southernmost first; a copy. */
+    public byte[][] cells() {
+        byte[][] copy = new byte[cells.length][];
+        for (int row = 0; row < cells.length; ++row) copy[row] = cells[row].clone();
+        return copy;
+    }
+
+    /** m, of a cell. */
+    public double resolution() {
+        return resolution;
+    }
+
+    /** x, y (m) of the first cell's corner in the world, and heading (rad). */
+    public double[] origin() {
+        return new double[] {x, y, heading};
+    }
+
+    /**
+     * Writes NAME.yaml and NAME.pgm, as map_server of ROS reads them. Throws RuedoException for
+     * what cannot be written.
+     */
+    public void save(String path) {
+        MapFile.save(this, Path.of(path));
     }
 
     /** The cell at a place of the world (m); -1 outside of the map. */

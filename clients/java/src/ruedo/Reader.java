@@ -36,9 +36,10 @@ public class Reader<T extends Sample> implements Iterable<T> {
     }
 
     /**
-     * The newest sample that neither latest() nor next() has returned yet; waits for one, at most
-     * timeout seconds of real time. After await() of a motion it is one from its end or later. A
-     * reader slower than the rate skips samples, which dropped() counts; onSample() skips none.
+     * The newest sample that neither latest() nor next() has returned yet, or of the newest
+     * queueDepth() the oldest; waits for one, at most timeout seconds of real time. After await()
+     * of a motion it is one from its end or later. A reader slower than the rate skips samples,
+     * which dropped() counts; onSample() skips none.
      */
     public T next(double timeout) {
         return samples.read(place, true, timeout);
@@ -46,7 +47,7 @@ public class Reader<T extends Sample> implements Iterable<T> {
 
     /**
      * What next() returns, again and again, until the run ends: for (Scan scan : robot.lrf()). A
-     * loop slower than the stream gets the newest sample each time.
+     * loop slower than the stream gets the newest sample each time, or the oldest of queueDepth().
      */
     @Override
     public Iterator<T> iterator() {
@@ -56,6 +57,20 @@ public class Reader<T extends Sample> implements Iterable<T> {
     /** The same as a stream of Java's: robot.lrf().samples().limit(10).forEach(...). */
     public java.util.stream.Stream<T> samples() {
         return StreamSupport.stream(spliterator(), false);
+    }
+
+    /**
+     * How many samples wait for next() and loops, from 1 (the newest alone, from which a stream
+     * starts) to 1000. With more, next() returns the oldest that waits; where more than that came
+     * meanwhile, the oldest go, and dropped() counts them.
+     */
+    public int queueDepth() {
+        return samples.queueDepth(place);
+    }
+
+    /** Sets {@link #queueDepth()}. */
+    public void setQueueDepth(int depth) {
+        samples.setQueueDepth(place, depth);
     }
 
     /**

@@ -136,6 +136,26 @@ public final class Robot {
         return (Camera) first("image_t", "camera");
     }
 
+    /** The camera of that name. Throws UnknownName, which lists the devices; TypeMismatch. */
+    public Camera camera(String name) {
+        Device<?> device = device(name);
+        if (device instanceof Camera) return (Camera) device;
+        throw new RuedoException.TypeMismatch(
+                this.name + "/" + name + " sends " + device.type + ", not image_t");
+    }
+
+    /** The first camera that boxes what it sees in its picture. */
+    @SuppressWarnings("unchecked")
+    public Device<Boxes2D> boxes2d() {
+        return (Device<Boxes2D>) first("boxes_2d_t", "bounding box camera");
+    }
+
+    /** The first camera that boxes what it sees in space. */
+    @SuppressWarnings("unchecked")
+    public Device<Boxes3D> boxes3d() {
+        return (Device<Boxes3D>) first("boxes_3d_t", "bounding box camera in space");
+    }
+
     /** The first inertial measurement unit. */
     @SuppressWarnings("unchecked")
     public Device<Imu> imu() {
@@ -331,7 +351,12 @@ public final class Robot {
      * = robot.driving(0.3, 0.0)) { ... }.
      */
     public Driving driving(double v, double omega) {
-        setVelocity(v, omega);
+        return driving(v, omega, 0.0);
+    }
+
+    /** The same with vy, m/s to the left, of a robot that moves sideways. */
+    public Driving driving(double v, double omega, double vy) {
+        setVelocity(v, omega, vy);
         return () -> {
             try {
                 stop();

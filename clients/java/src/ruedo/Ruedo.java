@@ -1,5 +1,7 @@
 package ruedo;
 
+import java.nio.file.Path;
+
 /**
  * Ruedo's client for Java: connect to a robot simulation, read its sensors, drive its robots.
  *
@@ -44,6 +46,14 @@ public final class Ruedo {
      */
     public static Log readLog(String path) {
         return new Log(path);
+    }
+
+    /**
+     * Reads what `ruedo map`, {@link OccupancyMap#save} and map_server of ROS write: NAME.yaml, and
+     * the PGM that it names. Throws RuedoException, which names the file and what is wrong with it.
+     */
+    public static OccupancyMap loadMap(String path) {
+        return MapFile.load(Path.of(path));
     }
 
     /** {@link #launch(String, LaunchOptions)} in real time. */

@@ -103,7 +103,7 @@ final class ServerProcess {
             words.addAll(List.of("--lockstep", Integer.toString(options.lockstep)));
         for (String model : options.spawn) words.addAll(List.of("--spawn", model));
         for (String device : options.disable) words.addAll(List.of("--disable", device));
-        for (String setting : options.set) words.addAll(List.of("--set", setting));
+        for (String setting : options.settings) words.addAll(List.of("--set", setting));
         if (!options.noise) words.add("--no-noise");
         words.addAll(options.more);
         words.addAll(options.args);

@@ -272,25 +272,42 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Two streams joined by stamp: for (var both : sim.synchronised(robot.lrf(), robot.pose())) has
-     * in both.first each sample of the first stream, and in both.second what {@link Stream#at} of
-     * the other gives for its time. A loop slower than the stream gets the newest sample each time.
-     * Ends with the run.
+     * Streams joined by stamp: for (var both : sim.synchronised(robot.lrf(), robot.pose())) has in
+     * both.first each sample of the first stream, and in both.second what {@link Stream#at} of the
+     * second gives for its time; both.get(stream) has that of any of them. A loop slower than the
+     * first stream gets its newest sample each time, or the oldest of its {@link
+     * Stream#queueDepth()}. Ends with the run.
      */
     public <A extends Sample, B extends Sample> Iterable<Synchronised<A, B>> synchronised(
-            Stream<A> first, Stream<B> second) {
+            Stream<A> first, Stream<B> second, Stream<?>... others) {
         return () -> {
-            second.core.subscribe();
-            Reader<A> reader = first.reader();
+            List<StreamCore<?>> joined = new ArrayList<>(List.of(second.core));
+            for (Stream<?> other : others) joined.add(other.core);
+            for (StreamCore<?> one : joined) one.subscribe();
+            Reader<A> reader = first.reader(first.queueDepth());
             return new UntilRunEnds<>(
                     () -> {
-                        while (true) { // until the first one that came after the other's first
+                        while (true) { // until the first one that came after the others' first
                             A sample = reader.next(Double.POSITIVE_INFINITY);
-                            B other = second.core.at(sample.utime, Reader.DEFAULT_TIMEOUT);
-                            if (other != null) return new Synchronised<>(sample, other);
+                            Map<StreamCore<?>, Sample> all = at(sample.utime, joined);
+                            all.put(first.core, sample);
+                            @SuppressWarnings("unchecked")
+                            B at = (B) all.get(second.core);
+                            if (all.size() > joined.size())
+                                return new Synchronised<>(sample, at, all);
                         }
                     });
         };
+    }
+
+    /** Their samples of that moment (us), of those that have kept one. */
+    private static Map<StreamCore<?>, Sample> at(long utime, List<StreamCore<?>> streams) {
+        Map<StreamCore<?>, Sample> found = new HashMap<>();
+        for (StreamCore<?> stream : streams) {
+            Sample sample = stream.at(utime, Reader.DEFAULT_TIMEOUT);
+            if (sample != null) found.put(stream, sample);
+        }
+        return found;
     }
 
     // Control.

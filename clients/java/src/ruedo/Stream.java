@@ -34,7 +34,14 @@ public class Stream<T extends Sample> extends Reader<T> {
 
     /** A reader that has seen nothing yet. */
     public Reader<T> reader() {
-        return new Reader<>(core, new StreamCore.Place());
+        return reader(1);
+    }
+
+    /** The same with a {@link #queueDepth()} of its own. */
+    public Reader<T> reader(int depth) {
+        Reader<T> made = new Reader<>(core, new StreamCore.Place());
+        made.setQueueDepth(depth);
+        return made;
     }
 
     /** {@link #at(long, double)}, at most 5 s. */

@@ -6,6 +6,7 @@ import java.io.IOException;
 import java.nio.ByteBuffer;
 import java.util.ArrayDeque;
 import java.util.ArrayList;
+import java.util.Iterator;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.atomic.AtomicLong;
@@ -26,19 +27,22 @@ final class StreamCore<T extends Sample> {
     /** Periods: gaps of samples that are taken at whole steps tell no more than that. */
     private static final double MOST_UNEVEN = 0.25;
 
-    private static final int MOST_KEPT = 256; // for at()
+    private static final int MOST_KEPT = 256; // of what came before, where no depth is larger
     private static final long MOST_KEPT_BYTES = 4 << 20;
+    private static final int MOST_DEPTH = 1000;
 
     /** How far a reader has come. */
     static final class Place {
-        private long seen; // of the samples of the stream, the newest that a call has returned
+        private long seen; // of the samples of the stream, the last that a call has returned
         private long skipped;
+        private int depth = 1;
     }
 
     /** A message as it came. */
     private final class Arrival {
         final byte[] message;
         final long utime; // us
+        long number; // of the samples of the stream, with those that were lost
         private volatile T sample;
 
         Arrival(byte[] message) {
@@ -78,8 +82,9 @@ final class StreamCore<T extends Sample> {
     private final List<Thread> waiting = new ArrayList<>(); // these under this object's monitor
     private Subscription source;
     private Arrival newest;
-    private final ArrayDeque<Arrival> kept = new ArrayDeque<>(); // for at(), the newest last
+    private final ArrayDeque<Arrival> kept = new ArrayDeque<>(); // the newest last
     private long keptBytes;
+    private int leastKept = 1; // the largest depth of a reader
     private long count; // samples that came or were lost
     private long lastUtime = NO_TIME;
     private RuedoException fault;
@@ -213,22 +218,22 @@ final class StreamCore<T extends Sample> {
     private synchronized void take(Arrival arrival) {
         newest = arrival;
         fault = null;
-        keep(arrival);
         count += 1 + lostBefore(arrival.utime);
+        arrival.number = count;
+        keep(arrival);
         if (!waiting.isEmpty()) sim.progress.use(sim.clock.utime(), waiting);
         waiting.clear(); // who waits on says so
         notifyAll();
     }
 
     private void keep(Arrival arrival) {
-        if (arrival.utime == NO_TIME) return;
         if (!kept.isEmpty() && arrival.utime < kept.getLast().utime) { // sim time was reset
             kept.clear();
             keptBytes = 0;
         }
         kept.addLast(arrival);
         keptBytes += arrival.message.length;
-        while (kept.size() > MOST_KEPT || keptBytes > MOST_KEPT_BYTES)
+        while (kept.size() > leastKept && (kept.size() > MOST_KEPT || keptBytes > MOST_KEPT_BYTES))
             keptBytes -= kept.removeFirst().message.length;
     }
 
@@ -293,6 +298,18 @@ final class StreamCore<T extends Sample> {
         return reader.skipped;
     }
 
+    synchronized int queueDepth(Place reader) {
+        return reader.depth;
+    }
+
+    synchronized void setQueueDepth(Place reader, int depth) {
+        if (depth < 1 || depth > MOST_DEPTH)
+            throw new IllegalArgumentException(
+                    "queueDepth is " + depth + "; allowed are 1 to " + MOST_DEPTH);
+        reader.depth = depth;
+        leastKept = Math.max(leastKept, depth);
+    }
+
     T read(Place reader, boolean newOne, double timeout) {
         subscribe();
         sim.noteUse();
@@ -300,10 +317,10 @@ final class StreamCore<T extends Sample> {
         long notBefore = newOne ? sim.notBefore() : Long.MIN_VALUE;
         Arrival arrival;
         synchronized (this) {
-            await(() -> serves(reader, newOne, notBefore), timeout);
-            arrival = newest;
-            if (reader.seen > 0) reader.skipped += Math.max(0, count - reader.seen - 1);
-            reader.seen = count;
+            await(() -> found(reader, newOne, notBefore) != null, timeout);
+            arrival = found(reader, newOne, notBefore);
+            if (reader.seen > 0) reader.skipped += Math.max(0, arrival.number - reader.seen - 1);
+            reader.seen = arrival.number;
         }
         sim.noteUse();
         try {
@@ -316,10 +333,17 @@ final class StreamCore<T extends Sample> {
         }
     }
 
-    /** Whether the newest sample is what the reader wants. */
-    private boolean serves(Place reader, boolean newOne, long notBefore) {
-        if (newest == null || !newOne) return newest != null;
-        return reader.seen != count && newest.utime >= notBefore;
+    /** What the reader gets; null: that has not come yet. */
+    private Arrival found(Place reader, boolean newOne, long notBefore) {
+        if (!newOne) return newest;
+        Arrival oldest = null;
+        int left = reader.depth;
+        for (Iterator<Arrival> all = kept.descendingIterator(); all.hasNext() && left > 0; left--) {
+            Arrival arrival = all.next();
+            if (arrival.number <= reader.seen || arrival.utime < notBefore) break;
+            oldest = arrival;
+        }
+        return oldest;
     }
 
     private void await(BooleanSupplier ready, double timeout) {
