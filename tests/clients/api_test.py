@@ -466,3 +466,23 @@ def test_maps_give_the_same_in_each_language(language):
     expected = distance_transform_edt(cells != 100)[::7, ::9] * 0.1
     assert said.numbers("field") == pytest.approx(expected.ravel().tolist(), abs=1e-6)
     assert said.words("grown") == ["True", "False"]
+
+
+def test_who_begins_to_listen_while_a_sample_comes_gets_the_next(monkeypatch):
+    """Between its decoding, for which nobody had asked, and the calls."""
+    import ruedo
+
+    with ruedo.launch(HALL, disable=["p3at/camera"]) as sim:
+        pose, seen, listening = sim.robot("p3at").pose, [], []
+        pose.latest()
+        lost_before = pose._lost_before
+
+        def listen(utime):
+            if not listening:
+                listening.append(pose.on_arrival(seen.append))
+            return lost_before(utime)
+
+        monkeypatch.setattr(pose, "_lost_before", listen)
+        while len(seen) < 3:
+            pose.next()
+        assert None not in seen
