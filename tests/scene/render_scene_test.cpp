@@ -468,9 +468,9 @@ TEST(RenderScene, TexturesWithHolesAndWithout) {
 // Draws three states in turn, with one renderer.
 struct Sequence {
   World w;
-  Sequence() {
+  explicit Sequence(int pillars = 30) {
     World::show(w.add("floor", true, {}), Shape::plane, Vec3::Ones(), kGrey);
-    for (int i = 0; i < 30; ++i)
+    for (int i = 0; i < pillars; ++i)
       w.box("pillar" + std::to_string(i), {3.0 + 2 * i, (i % 5) - 2.0, 1}, {0.3, 0.3, 2}, kRed);
     w.box("mover", {4, 1, 0.5}, {0.5, 0.5, 1}, kGreen, false);
   }
@@ -498,6 +498,58 @@ TEST(RenderScene, WhatWasDrawnBeforeDoesNotShow) {
     EXPECT_EQ(a.rgb, b.rgb) << i;
     EXPECT_EQ(a.depth, b.depth) << i;
     EXPECT_EQ(a.labels, b.labels) << i;
+  }
+}
+
+// In a small world all cameras share a map of the shadows; in a large one it follows the camera.
+TEST(RenderScene, ShadowsAreThoseOfTheStep) {
+  for (const int pillars : {3, 30}) {
+    Sequence s(pillars);
+    world::Light sun;
+    sun.type = world::Light::Type::directional;
+    sun.direction = Vec3(0.4, -0.3, -1).normalized();
+    sun.cast_shadows = true;
+    s.w.world.lights.push_back(sun);
+    const world::BodyLayout layout(s.w.world);
+    const auto used = make_renderer(s.w.world, layout);
+    const auto draw = [&](Renderer& renderer, int state, int view) {
+      Picture picture;
+      picture.want_depth = picture.want_labels = false;
+      renderer.draw(s.state(layout, state), s.view(view), picture);
+      return picture.rgb;
+    };
+    for (const auto& [state, view] :
+         {std::pair{0, 0}, {0, 1}, {0, 0}, {1, 0}, {1, 1}, {1, 0}, {0, 0}, {2, 0}, {0, 1}})
+      EXPECT_EQ(draw(*used, state, view), draw(*make_renderer(s.w.world, layout), state, view))
+          << pillars << " pillars, state " << state << ", view " << view;
+    EXPECT_NE(draw(*used, 0, 0), draw(*used, 1, 0));
+  }
+}
+
+// Of what moves only that is drawn into the map whose shadow a view may show; of what stands still
+// all is.
+TEST(RenderScene, ShadowsOfMoversAreThoseOfThingsThatStandStill) {
+  const auto picture = [](bool is_static, double yaw, double pitch) {
+    World w;
+    world::Light sun;
+    sun.type = world::Light::Type::directional;
+    sun.direction = Vec3(0.9, 0.5, -0.4).normalized();  // low: the shadows are long
+    sun.cast_shadows = true;
+    w.world.lights.push_back(sun);
+    World::show(w.add("floor", true, {}), Shape::plane, Vec3::Ones(), kGrey);
+    for (int i = 0; i < 196; ++i)
+      w.box("box" + std::to_string(i),
+            {5.0 * (i % 14) - 32, 5.0 * (i / 14) - 32, 0.5 * (1 + i % 4)}, {0.4, 0.6, 1.0 + i % 4},
+            kRed, is_static);
+    const View view =
+        View::pinhole(Pose::from_xyz_rpy({0.5, 0.5, 2}, {0, pitch, yaw}), 160, 120, 1.0);
+    return draw(w, view, false, false).rgb;
+  };
+  for (const double yaw : {0.0, 1.3, 2.6, 3.9, 5.2}) {
+    for (const double pitch : {0.1, 0.8}) {
+      const auto moving = picture(false, yaw, pitch);
+      EXPECT_EQ(moving, picture(true, yaw, pitch)) << yaw << ", " << pitch;
+    }
   }
 }
 

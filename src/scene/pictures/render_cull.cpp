@@ -13,6 +13,11 @@ constexpr double kCoarseShadowRadius = 0.25;
 
 }  // namespace
 
+bool same_drawing(const DrawList& a, const DrawList& b) {
+  const auto bytes = [](const DrawList& list) { return std::as_bytes(std::span(list.instances)); };
+  return a.opaque == b.opaque && std::ranges::equal(bytes(a), bytes(b));
+}
+
 Region view_region(const View& view) {
   const auto& [rotation, eye] = view.X_WCamera;
   const Vec3 ahead = rotation * Vec3::UnitX(), left = rotation * Vec3::UnitY(),

@@ -23,6 +23,7 @@ struct Instance {
 struct Run {
   int batch;
   uint32_t first, count;  // of DrawList::instances
+  friend bool operator==(const Run&, const Run&) = default;
 };
 
 struct DrawList {
@@ -32,6 +33,9 @@ struct DrawList {
   std::vector<std::pair<Vec3, double>>
       spheres;  // collect_casters() only: bounds of the links, m, world
 };
+
+// Whether what is opaque is the same, to the bit.
+bool same_drawing(const DrawList& a, const DrawList& b);
 
 // A convex region bounded by planes n.p + d >= 0 with normals pointing inwards, in world
 // coordinates.

@@ -28,6 +28,48 @@ Vec4 light_colour(const world::Light& light) {
 
 // Range of shadows around a camera among the things, m.
 constexpr double kShadowReach = 20.0;
+// Of the map, around what a view sees: lookups are offset and filtered.
+constexpr double kMarginTexels = 8.0;
+
+// Corners of what a view sees, m, world.
+std::vector<Vec3> corners_of(const View& view) {
+  const auto& [rotation, eye] = view.X_WCamera;
+  const Vec3 ahead = rotation * Vec3::UnitX(), left = rotation * Vec3::UnitY(),
+             up = rotation * Vec3::UnitZ();
+  std::vector<Vec3> corners;
+  for (const double distance : {view.orthographic ? view.near_m : 0.0, view.far_m}) {
+    const double scale = view.orthographic ? 1.0 : distance;
+    for (const double u : {-0.5, view.width - 0.5}) {
+      for (const double v : {-0.5, view.height - 0.5})
+        corners.push_back(eye + distance * ahead + scale * (view.cx - u) / view.fx * left +
+                          scale * (view.cy - v) / view.fy * up);
+    }
+  }
+  return corners;
+}
+
+// The convex hull of points, counterclockwise (A. M. Andrew's monotone chain, 1979).
+std::vector<Eigen::Vector2d> hull_of(std::vector<Eigen::Vector2d> points) {
+  const auto before = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
+  };
+  std::sort(points.begin(), points.end(), before);
+  std::vector<Eigen::Vector2d> hull;
+  for (int side = 0; side < 2; ++side) {
+    const size_t begin = hull.size();
+    for (const Eigen::Vector2d& point : points) {
+      while (hull.size() >= begin + 2) {
+        const Eigen::Vector2d a = hull.back() - hull[hull.size() - 2], b = point - hull.back();
+        if (a.x() * b.y() - a.y() * b.x() > 0.0) break;
+        hull.pop_back();
+      }
+      hull.push_back(point);
+    }
+    hull.pop_back();
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
 
 }  // namespace
 
@@ -132,6 +174,24 @@ void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
   for (const auto& [normal, size] : {std::pair{right, half}, {up, half}, {to_sun, reach}}) {
     shadow_.region.planes.push_back({normal, size - normal.dot(centre)});
     shadow_.region.planes.push_back({-normal, size + normal.dot(centre)});
+  }
+  shadow_.seen = shadow_.region;
+  if (half < whole) limit_to(view);  // otherwise all views share the map
+}
+
+// To the view's silhouette, as the sun sees it.
+void RenderLights::limit_to(const View& view) {
+  std::vector<Eigen::Vector2d> points;
+  for (const Vec3& corner : corners_of(view))
+    points.emplace_back(shadow_.right.dot(corner), shadow_.up.dot(corner));
+  const std::vector<Eigen::Vector2d> hull = hull_of(points);
+  if (hull.size() < 3) return;
+  const double margin = kMarginTexels * 2.0 * shadow_.half / ShadowRegion::kSize;
+  for (size_t i = 0; i < hull.size(); ++i) {
+    const Eigen::Vector2d edge = (hull[(i + 1) % hull.size()] - hull[i]).normalized();
+    const Eigen::Vector2d inwards(-edge.y(), edge.x());
+    shadow_.seen.planes.push_back(
+        {inwards.x() * shadow_.right + inwards.y() * shadow_.up, margin - inwards.dot(hull[i])});
   }
 }
 

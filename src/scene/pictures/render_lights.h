@@ -14,7 +14,8 @@ namespace ruedo::scene {
 struct ShadowRegion {
   static constexpr int kSize = 2048;  // side of the shadow map in texels
   Region region;
-  Vec3 centre = Vec3::Zero();                                              // m, world
+  Region seen;                 // the part of it whose shadows may be in the view
+  Vec3 centre = Vec3::Zero();  // m, world
   Vec3 right = Vec3::UnitX(), up = Vec3::UnitY(), to_sun = Vec3::UnitZ();  // its axes
   double half = 1.0;   // m, half the side length
   double reach = 1.0;  // m, half the length along the rays
@@ -40,6 +41,7 @@ class RenderLights {
 
  private:
   void place_shadow(const Vec3& to_sun, const View& view);
+  void limit_to(const View& view);
 
   const world::WorldModel& world_;
   const RenderContent& content_;

@@ -128,9 +128,9 @@ class GlRenderer : public Renderer {
                     static_cast<float>(view.exposure), 0.0f};
   }
 
-  // The static map is drawn once for each position of the region, the movers for each picture. Both
-  // are computed relative to the region's centre, not the eye: earlier pictures must leave no
-  // trace.
+  // The static map is drawn once for each position of the region, the movers once for all pictures
+  // of a step. Both are computed relative to the region's centre, not the eye: earlier pictures
+  // must leave no trace.
   void draw_shadows() {
     if (!lights_.counts().shadow) return;
     const ShadowRegion& shadow = lights_.shadow();
@@ -138,7 +138,8 @@ class GlRenderer : public Renderer {
     FrameBlock frame{};
     frame.shadow_from_world = to_floats(shadow.map_from_world(shadow.centre));
     device_.set_frame(frame);
-    if (!shadow_drawn_ || !shadow.same_place(shadow_place_)) {
+    const bool elsewhere = !shadow_drawn_ || !shadow.same_place(shadow_place_);
+    if (elsewhere) {
       culler_.collect_casters(shadow.region, shadow.centre, Movers::only_static, casters_);
       device_.begin_still_shadow(kSize);
       device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
@@ -146,13 +147,15 @@ class GlRenderer : public Renderer {
       shadow_drawn_ = true;
       stale_ = {0, 0, kSize, kSize};
     }
-    culler_.collect_casters(shadow.region, shadow.centre, Movers::only_moving, casters_);
+    culler_.collect_casters(shadow.seen, shadow.centre, Movers::only_moving, casters_);
+    if (!elsewhere && same_drawing(casters_, movers_)) return;
+    std::swap(casters_, movers_);
     device_.begin_shadow(kSize, stale_);
     stale_ = {};
-    if (casters_.opaque.empty()) return;
-    device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
+    if (movers_.opaque.empty()) return;
+    device_.draw(Pass::shadow, movers_.instances, movers_.opaque);
     Eigen::AlignedBox2d box;
-    for (const auto& [centre, radius] : casters_.spheres) {
+    for (const auto& [centre, radius] : movers_.spheres) {
       const Eigen::Vector2d at(shadow.right.dot(centre - shadow.centre),
                                shadow.up.dot(centre - shadow.centre));
       box.extend(at.array().matrix() - Eigen::Vector2d::Constant(radius));
@@ -273,6 +276,7 @@ class GlRenderer : public Renderer {
   RenderDevice device_;
   std::string description_;
   DrawList visible_, casters_, close_;
+  DrawList movers_;                 // in the shadow map in use
   std::vector<float> close_depth_;  // as stored by OpenGL
   std::vector<float> overlay_;
   ShadowRegion shadow_place_;  // region of the kept shadow map
