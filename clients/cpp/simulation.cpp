@@ -134,8 +134,7 @@ Every Simulation::every(Duration period) const {
 // Until the next multiple of the period; those that have passed meanwhile are left out.
 std::optional<double> Every::next() const {
   core_->check_open();
-  if (core_->in_lockstep())
-    throw NotSupported("in lockstep nothing goes on without its clients: use sim.step(n)");
+  if (core_->in_lockstep()) throw NotSupported("in lockstep, only sim.step(n) advances time");
   const int64_t begin = core_->utime();
   const int64_t following = (begin / period_us_ + 1) * period_us_;
   const bool in_time = begin < next_us_ + period_us_ && next_us_ + period_us_ <= following;

@@ -26,8 +26,8 @@ OSSL_LIB_CTX* context() {
 void require(bool done) {
   if (!done)
     throw EnvironmentError(
-        "this machine's OpenSSL (libcrypto) computes no SHA-256; without it no "
-        "file can be told from a changed one");
+        "this machine's OpenSSL (libcrypto) cannot compute SHA-256, by which Ruedo recognises "
+        "changed files");
 }
 
 class Digest {

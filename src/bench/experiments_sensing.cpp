@@ -253,7 +253,7 @@ void noise_experiment(Experiments& all) {
   const auto inside = [](double value, double half) { return std::abs(value - kNoise_m) < half; };
   all.report({"E5", "noise off: scans of 20 seeds that differ from the ideal one in any bit", "off",
               differs, "", "none", differs == 0});
-  all.report({"E5", "noise on: sigma of one ray, 1000 seeds (10 mm asked for)", "on",
+  all.report({"E5", "noise on: sigma of one ray, 1000 seeds (10 mm configured)", "on",
               1000 * sigma_one, "mm", fmt::format("99 %: 10 +- {:.2f} mm", 1000 * interval(kSeeds)),
               inside(sigma_one, interval(kSeeds))});
   all.report({"E5", "noise on: sigma of all rays, 1000 seeds", "on", 1000 * sigma, "mm",

@@ -257,7 +257,7 @@ void TcpqServer::read_from(Client& client) {
     client.reader.tidy();
     received_ += client.reader.held() - held;
     if (result == tcpq::Reader::Result::broken)
-      return drop(client, "what it sends is not LCM's tcpq, or too large");
+      return drop(client, "its data is not LCM's tcpq, or too large");
     if (received_ > kMostReceived) return drop(client, "unfinished messages take too much memory");
     if (!greeted && client.reader.greeted()) {
       client.rest = tcpq::server_hello();

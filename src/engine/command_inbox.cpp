@@ -34,7 +34,7 @@ DecodeFault try_decoding(const uint8_t* data, size_t size) {
 // A fault's values are checked on arrival; whether its robot has that device, when it acts.
 std::string check_fault_message(const uint8_t* data, size_t size, world::Fault& fault) {
   fault_t message;
-  if (decode_checked(data, size, message) != DecodeFault::none) return "it is none";
+  if (decode_checked(data, size, message) != DecodeFault::none) return "it is not a fault_t";
   fault = fault_of(message);
   return world::check_fault(fault);
 }
@@ -48,7 +48,7 @@ std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
   }
   markers_t markers;
   if (kind != Input::Kind::markers) return "";
-  if (decode_checked(data, size, markers) != DecodeFault::none) return "it is none";
+  if (decode_checked(data, size, markers) != DecodeFault::none) return "it is not a markers_t";
   return check_markers(markers);
 }
 

@@ -123,9 +123,8 @@ void Simulation::remove_model(InstanceIndex instance, Channels& channels) {
     }
   } catch (const std::exception&
                error) {  // without its scene or renderer, a module would sample nothing, or crash
-    throw SceneLost(
-        std::string("what sensors see cannot be made again after a change of the world: ") +
-        error.what());
+    throw SceneLost(std::string("cannot rebuild the sensors' scene after a change of the world: ") +
+                    error.what());
   }
 }
 
@@ -244,14 +243,15 @@ std::string Simulation::at_work() const {
     const Module& module = thread->module();
     if (!thread->has_batches()) continue;
     const int place = module.at_work();
-    if (place < 0 || place >= module.devices()) return "the module " + module.name() + " works";
+    if (place < 0 || place >= module.devices())
+      return "the module " + module.name() + " is computing";
     const Device& device = module.device(place);
     std::string name = device.name;
     if (device.robot.valid()) {
       const InstanceIndex instance = layout().robots[device.robot].instance;
       name = world().models[instance].name + "/" + name;
     }
-    return "the module " + module.name() + " works for " + name;
+    return "the module " + module.name() + " is computing " + name;
   }
   const int64_t step = computing_.load(std::memory_order_relaxed);
   return step < 0 ? "" : "step " + std::to_string(step) + " is being computed";

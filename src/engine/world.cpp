@@ -97,7 +97,7 @@ void World::exchange(StateArchive& archive) {
   archive(inbox_, *physics_, *robots_);
   for (const auto& module : modules_) {
     const Device* without = module->exchange(archive);
-    if (without) StateArchive::refuse("the device '" + without->name + "' says not what it keeps");
+    if (without) StateArchive::refuse("the device '" + without->name + "' cannot save its state");
   }
 }
 

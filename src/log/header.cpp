@@ -324,7 +324,7 @@ std::vector<std::string> machine_differences(const log_header_t& log, const log_
   std::vector<std::string> lines;
   const auto compare = [&](const char* what, const std::string& then, const std::string& now) {
     if (then != now)
-      lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
+      lines.push_back(std::string(what) + ": the log has " + then + ", here: " + now);
   };
   compare("Ruedo", without_build(log.version), without_build(here.version));
   const auto architecture = [](const std::string& cpu) { return cpu.substr(0, cpu.find(' ')); };

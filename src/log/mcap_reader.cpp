@@ -143,11 +143,12 @@ class McapFile {
     const std::span<const uint8_t> all = fields.take(fields.number<uint64_t>());
     if (!fields.good()) damaged("has a damaged chunk");
     if (!compression.empty())
-      throw InputError({path_}, "is compressed (" + compression +
-                                    "); what is read here is not: `mcap compress --compression "
-                                    "none` makes such a file");
+      throw InputError({path_},
+                       "is compressed (" + compression +
+                           "); Ruedo reads uncompressed files: `mcap compress --compression "
+                           "none` makes such a file");
     if (crc != 0 && crc32(all.data(), all.size()) != crc)
-      damaged("has a chunk that is not what was written (CRC-32)");
+      damaged("has a chunk whose CRC-32 is wrong");
     Fields records(all);
     while (!records.rest().empty()) {
       const auto op = records.number<uint8_t>();

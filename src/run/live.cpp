@@ -24,7 +24,7 @@ bool Live::on_message(const std::string& channel, const uint8_t* data, size_t si
 std::string Live::waits_for(int64_t step) const {
   const std::string missing = wait_for_ ? wait_for_->waits_for(step) : "";
   if (missing.empty()) return "";
-  return "what --wait-for wants, " + missing +
+  return "the input of --wait-for, " + missing +
          ". Does its sender run, and did it before this server started?";
 }
 

@@ -69,7 +69,7 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
                        [this](int64_t step) { return launcher_wants_tick(step); }},
              .info = {publisher_, world_->step_us, [this] { return pacer_->paused(); }}},
       on_stall_(
-          [](const std::string& reason) { spdlog::warn("the run does not go on: {}", reason); }),
+          [](const std::string& reason) { spdlog::warn("the run makes no progress: {}", reason); }),
       worker_(models_, wakeup_, options_.before_model),
       control_(run_id_, control_host()),
       stall_watch_({.tell = [this](const std::string& reason) { on_stall_(reason); },
@@ -315,11 +315,12 @@ std::string Run::why_idle() {
   }
   const bool starts = publisher_.step() < 0;  // as its program does, which may take seconds
   if (who.empty() && !starts && waits_for_launcher())
-    who = "its program, which has not come this far: is it stopped, or is a callback slow?";
+    who =
+        "its program, which has not read the samples so far: is it stopped, or is a callback slow?";
   std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
   if (why.empty()) return "";
-  return starts ? why + " (there is no state yet)"
-                : fmt::format("{} (the last state was that of step {})", why, publisher_.step());
+  return starts ? why + " (before the first step)"
+                : fmt::format("{} (the last step was {})", why, publisher_.step());
 }
 
 bool Run::waits_for_launcher() const {

@@ -72,13 +72,12 @@ void LogSink::File::flush() {
   }
   if (ring_ && !ring_->repeats() && !std::exchange(told_, true))
     spdlog::warn(
-        "what acted on the run takes half of --record-limit: {} repeats it up to here, and no "
-        "further",
+        "commands and requests take half of --record-limit: {} repeats the run up to here only",
         path_);
   if (ring_ && !ring_->follows() && !std::exchange(told_unfollowed_, true))
     spdlog::warn(
-        "what changed the world takes more than a sixteenth of --record-limit: the numbered files "
-        "beside {} begin without what came after it",
+        "changes of the world take more than a sixteenth of --record-limit: the numbered files "
+        "beside {} begin without the later ones",
         path_);
 }
 

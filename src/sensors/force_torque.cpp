@@ -166,7 +166,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
       setup.findings->unsupported(
           setup.element.source, "sensor " + setup.device,
           loop ? "its joint is part of a loop of joints: it has no value"
-               : "both sides of its joint are held by what tells no force: it has no value");
+               : "the forces of what holds both sides of its joint are not known: it has no value");
     }
   }
 

@@ -154,7 +154,7 @@ class Loader {
             findings_.error(
                 child->source, "model " + name,
                 "<pose> is relative to '" + scope->relative_to +
-                    "', which is not a frame beside the model; it is that in the world");
+                    "', which is not a frame beside the model; it is relative to the world");
           add(name, scope->pose, scope->model, child->source);
         }
         any = true;

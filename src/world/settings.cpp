@@ -218,7 +218,7 @@ void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world) {
                                "; there are " + listed(names));
     }
     if (instance->model->is_static)
-      throw InputError({}, option + ": the model is static; what drives is not");
+      throw InputError({}, option + ": the model is static, and cannot drive");
     auto drive = std::make_shared<Element>();
     drive->name = "ruedo:drive";
     drive->source = {option, 0};

@@ -400,7 +400,7 @@ def test_a_controller_that_dies_is_said(bot_core):
     server = Server(7833, *WAITING)
     assert controller.stdout.readline() == "a second of scans\n"
     controller.kill()
-    said, stall = [], "it waits for what --wait-for wants, message"
+    said, stall = [], "it waits for the input of --wait-for, message"
     while not said or stall not in said[-1]:
         said.append(server.process.stderr.readline())
         assert said[-1], said

@@ -313,7 +313,7 @@ def test_doctor_names_who_serves():
         [RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE
     )
     assert re.search(
-        r"^hint +server +none answers on udpm://.*ruedo run", done.stdout, re.MULTILINE
+        r"^hint +server +no server answers on udpm://.*ruedo run", done.stdout, re.MULTILINE
     )
 
 

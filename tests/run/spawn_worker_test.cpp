@@ -157,7 +157,7 @@ TEST(SpawnWorker, FewWait) {
     client.send(spawning(static_cast<int>(i)));
   const reply_t beyond = client.ask(spawning(9));
   EXPECT_EQ(beyond.code, reply_t::REFUSED);
-  EXPECT_NE(beyond.text.find("are being made ready"), std::string::npos) << beyond.text;
+  EXPECT_NE(beyond.text.find("are still loading"), std::string::npos) << beyond.text;
   gate.open.set_value();
 }
 

@@ -144,7 +144,7 @@ TEST(StallWatch, NamesTheModuleThatIsAtWork) {
       "<sensor name='front' type='gpu_ray'><update_rate>10</update_rate><ray><scan><horizontal>"
       "<samples>5</samples><min_angle>-1</min_angle><max_angle>1</max_angle></horizontal></scan>"
       "<range><min>0.1</min><max>8</max></range></ray></sensor>";
-  EXPECT_THAT(reason_of(options, lrf, bus, told), HasSubstr("the module lrf works"));
+  EXPECT_THAT(reason_of(options, lrf, bus, told), HasSubstr("the module lrf is computing"));
 }
 
 TEST(StallWatch, NamesTheBus) {
@@ -163,7 +163,7 @@ std::string reason_with_a_full_pipe(int samples, double seconds) {
   EXPECT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const FileHandle end(::open(pipe.c_str(), O_RDWR | O_CLOEXEC));
   MemoryBus bus;
-  Told told("the module lrf works");
+  Told told("the module lrf is computing");
   RunOptions options = fast(seconds);
   options.record = pipe;
   const std::string lrf =

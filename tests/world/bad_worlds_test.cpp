@@ -58,7 +58,7 @@ const std::vector<BadWorld>& table() {
       {"OnlyAMark", "\xEF\xBB\xBF\n", ": the file is empty"},
       {"NoXml", "hello", ":1: not XML: the text does not begin with '<'"},
       {"NotClosed", "<sdf version='1.9'>\n<world name='w'>\n</sdf>",
-       ":2: not XML: this element is closed by another name, or not at all"},
+       ":2: not XML: this element has no closing tag of the same name"},
       {"AttributeWithoutQuotes", "<sdf version=1.9/>",
        ":1: not XML: an attribute that is not complete"},
       {"CommentWithoutEnd", "<sdf version='1.9'><!-- \n", ":1: not XML: a comment that never ends"},
@@ -120,16 +120,16 @@ const std::vector<BadWorld>& table() {
        "the model is left out"},
       {"StepZero", in_world("<physics type='ode'><max_step_size>0</max_step_size></physics>"),
        ":3: <max_step_size>: '0' is not allowed; allowed is a number from 1e-06 to 1",
-       "what is usual is taken"},
+       "the defaults are used"},
       {"GravityTooLarge", in_world("<gravity>1e101 0.1 -9.7</gravity>"),
        ":3: <world/gravity>: '1e101' is too large for a gravity; allowed is up to 1000 m/s^2",
-       "what is usual is taken"},
+       "the defaults are used"},
       {"GravityOfPhysicsTooLarge",
        in_world("<physics type='ode'><gravity>0 0 -1e9</gravity></physics>"),
        ":3: <physics/gravity>: '-1e9' is too large for a gravity; allowed is up to 1000 m/s^2",
-       "what is usual is taken"},
+       "the defaults are used"},
       {"GravityOfTwo", in_world("<gravity>0 -9.8</gravity>"),
-       ":3: <world/gravity>: '0 -9.8' has 2 numbers; allowed are three", "what is usual is taken"},
+       ":3: <world/gravity>: '0 -9.8' has 2 numbers; allowed are three", "the defaults are used"},
       {"ColourOfTwo",
        in_link("<visual "
                "name='v'><geometry><sphere><radius>1</radius></sphere></"
@@ -245,7 +245,7 @@ const std::vector<BadWorld>& table() {
        "link='a'/><child link='b'/></joint></robot>",
        ":2: a revolute joint without <limit>", "it has none"},
       {"UrdfTwoRoots", "<robot name='r'>\n<link name='a'/><link name='b'/></robot>",
-       ":2: does not hang on 'a'", "the link is left out"},
+       ":2: is not connected to 'a'", "the link is left out"},
       {"JointToAnotherModel",
        joint("<joint name='j' type='fixed'><parent>table::top</parent><child>a</child></joint>"),
        ":5: <parent>: there is no frame 'table::top' in model m; it can be of this model or of one "
@@ -382,7 +382,7 @@ TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
     for (const auto& world : {load_world(path), load_world_text(text, path)}) {
       EXPECT_TRUE(world->models.empty()) << uri;
       ASSERT_EQ(world->findings.size(), 1u) << uri;
-      EXPECT_EQ(world->findings[0].text, "'" + uri + "' " + why + "; the world goes on without it");
+      EXPECT_EQ(world->findings[0].text, "'" + uri + "' " + why + "; the world runs without it");
     }
     LoadOptions options;
     options.allow_absolute = true;

@@ -197,7 +197,7 @@ TEST(DriveOption, SaysWhatThereIs) {
             "--drive bot: <ruedo:left_joint>: there is no joint 'jll' in the model 'bot'; did you "
             "mean 'jl'?");
   EXPECT_EQ(error({"ground_plane", {"jl"}, {"jr"}}),
-            "--drive ground_plane: the model is static; what drives is not");
+            "--drive ground_plane: the model is static, and cannot drive");
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ TEST(IncludeParams, WhatCannotBeDoneIsNamedAndTheRestIsDone) {
              "'eye' is there already"},
         Case{"<sensor element_id='base' type='imu' action='add'/>", "has no name"},
         Case{"<link element_id='base' action='remove'><light/></link>",
-             "<light> in <experimental:params>: there is none to be removed"}}) {
+             "<light> in <experimental:params>: there is no such element to remove"}}) {
     Included included;
     const auto world =
         included.with(std::string(c.params) + "<sensor element_id='base::gps' action='remove'/>");

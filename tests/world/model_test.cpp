@@ -133,9 +133,9 @@ TEST(Includes, OverridesAndNames) {
   EXPECT_EQ(world->models[2].model->sensors[0].name, "eye");
   EXPECT_TRUE(world->models[0].model->sensors.empty());
   EXPECT_EQ(world->models[3].model, world->models[0].model);
-  EXPECT_EQ(texts(*world), (std::vector<std::string>{
-                               "plugins are not loaded: libx.so",
-                               "'model://none' is not found; the world goes on without it"}));
+  EXPECT_EQ(texts(*world),
+            (std::vector<std::string>{"plugins are not loaded: libx.so",
+                                      "'model://none' is not found; the world runs without it"}));
   EXPECT_EQ(world->findings.back().source.line, 1);
   EXPECT_EQ(world->files_read.size(), 3u);  // its model.config says which file is the model's
 }
@@ -205,11 +205,10 @@ TEST(Includes, PackagesGoByTheirManifests) {
       "/cart_desc/sdf/cart.sdf</uri></include></world></sdf>"));
   ASSERT_EQ(world->models.size(), 2u);
   EXPECT_EQ(world->models[0].model, world->models[1].model);
-  EXPECT_EQ(
-      texts(*world),
-      (std::vector<std::string>{
-          "'package://cart_description/sdf/none.sdf' is not found; the world goes on without it",
-          "'package://cart_desc/sdf/cart.sdf' is not found; the world goes on without it"}));
+  EXPECT_EQ(texts(*world),
+            (std::vector<std::string>{
+                "'package://cart_description/sdf/none.sdf' is not found; the world runs without it",
+                "'package://cart_desc/sdf/cart.sdf' is not found; the world runs without it"}));
 }
 
 TEST(Includes, AThousandShareOneModel) {

@@ -71,7 +71,7 @@ TEST(OddDrives, MayHaveElementsOfAnotherType) {
 
 TEST(OddDrives, WhoseWheelsCannotRoll) {
   const std::string cannot = "the joint 'jr' cannot roll a wheel: ",
-                    anyhow = "; the robot drives as if it could";
+                    anyhow = "; the kinematic drive moves the robot regardless";
   EXPECT_THAT(named(robot(drive(), "0 0 1")), ElementsAre(cannot + "its axis is upright" + anyhow));
   EXPECT_THAT(named(robot(drive(), "1 0 0")),
               ElementsAre(cannot + "its axis points ahead" + anyhow));
@@ -240,9 +240,9 @@ TEST(OddValuesOfUrdf, NumbersBelowZero) {
                   "velocity=\"-2\" of <limit> is not allowed; allowed is a number of at least 0; "
                   "there is no limit",
                   "damping=\"-3\" of <dynamics> is not allowed; allowed is a number of at least 0; "
-                  "there is none",
+                  "0 is used",
                   "friction=\"-4\" of <dynamics> is not allowed; allowed is a number of at least "
-                  "0; there is none"));
+                  "0; 0 is used"));
   EXPECT_THAT(of_urdf("continuous'>" + kLimit),
               ElementsAre("a continuous joint has no limits: those of -1 to 1 are left out"));
   const auto world = load_world_text(

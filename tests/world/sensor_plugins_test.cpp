@@ -125,7 +125,7 @@ TEST(SensorPlugins, WhatDoesNotActOrIsWrongIsNamed) {
              "<rateScaleError> of the plugin hector_gazebo_ros_imu is not supported"},
         Case{"libhector_gazebo_ros_baro.so", "<qnh>1000</qnh>", "<qnh> of the plugin"},
         Case{"libgazebo_ros_p3d.so", "<frameName>other_link</frameName>",
-             "'other_link' is not supported: the pose is that in the world"},
+             "'other_link' is not supported: the pose is relative to the world"},
         Case{"libgazebo_ros_p3d.so", "<bodyName>nowhere</bodyName>", "the sensor is left out"},
         Case{"libhector_gazebo_ros_gps.so", "<referenceLatitude>95</referenceLatitude>",
              "'95' is not allowed"},

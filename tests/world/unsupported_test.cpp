@@ -88,13 +88,13 @@ INSTANTIATE_TEST_SUITE_P(
              "<plugin filename='gz-sim-track-controller-system' name='x'><link>b</link></plugin>"
              "<plugin filename='gz-sim-tracked-vehicle-system' name='x'><left_track><link>a</link>"
              "</left_track><tracks_separation>0.4</tracks_separation></plugin>",
-             "the plugin TrackController does nothing here: its belt would run as it is told; "
-             "<ruedo:belt> has one run"},
+             "the plugin TrackController has no effect here: its belt would follow commands; "
+             "<ruedo:belt> has a fixed velocity"},
         Part{"LoneTrack",
              "<plugin filename='gz-sim-track-controller-system' "
              "name='gz::sim::systems::TrackController'/>",
-             "the plugin TrackController does nothing here: its belt would run as it is told; "
-             "<ruedo:belt> has one run"},
+             "the plugin TrackController has no effect here: its belt would follow commands; "
+             "<ruedo:belt> has a fixed velocity"},
         Part{
             "BounceThreshold",
             surface("<bounce><restitution_coefficient>0.5</restitution_coefficient><threshold>0.1"
@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "<link name='d'><collision "
                 "name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface><bounce>"
                 "<threshold>100000.0</threshold></bounce></surface></collision></link>",
-            "<threshold> is not supported: what bounces, bounces at any speed"},
+            "<threshold> is not supported: bodies bounce at any speed"},
         Part{"SoftStops",
              joint("revolute",
                    "<limit><lower>-1</lower><upper>1</upper><stiffness>100</stiffness><dissipation>"

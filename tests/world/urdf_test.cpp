@@ -79,11 +79,12 @@ TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
            "upper='x' effort='1' velocity='1'/></joint>",
        "<limit>: upper=\"x\" is not a number; it is left out", 3, 2},
       {"<joint name='j' type='hinge'>" + ends + "</joint>",
-       "type 'hinge' is none; allowed are fixed, revolute, continuous, prismatic, planar and "
+       "type 'hinge' is unknown; allowed are fixed, revolute, continuous, prismatic, planar and "
        "floating; it is taken as fixed",
        3, 2},
       {"<joint name='j'>" + ends + "</joint>",
-       "type '' is none; allowed are fixed, revolute, continuous, prismatic, planar and floating; "
+       "type '' is unknown; allowed are fixed, revolute, continuous, prismatic, planar and "
+       "floating; "
        "it is taken as fixed",
        3, 2},
       {"<joint name='j' type='continuous'>" + ends + "<mimic multiplier='2'/></joint>",
@@ -97,13 +98,13 @@ TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
       {"<joint name='j' type='fixed'>" + ends +
            "</joint><joint name='k' type='fixed'><parent "
            "link='hand'/><child link='base'/></joint>",
-       "'arm' would hang on itself; the joint is left out", 3, 2},
+       "'arm' would be its own ancestor; the joint is left out", 3, 2},
       {"<joint type='fixed'>" + ends + "</joint>",
        "a <joint> without a name; the joint is left out", 2, 1},
       {"<joint name='j' type='fixed'>" + ends + "</joint><link name='arm'/>",
        "a second <link> of the name 'arm'; the link is left out", 3, 2},
       {"<joint name='j' type='fixed'>" + ends + "</joint><link name='far'/>",
-       "does not hang on 'base'; the link is left out", 3, 2},
+       "is not connected to 'base'; the link is left out", 3, 2},
   };
   for (const Case& each : cases) {
     TemporaryFolder folder;

@@ -125,8 +125,7 @@ export class Control {
   }
 
   private notePaused(): void {
-    if (this.page.now.paused && !this.isLog)
-      toast("The run is paused: nothing moves until it goes on (space).");
+    if (this.page.now.paused && !this.isLog) toast("The run is paused: press space to resume it.");
   }
 
   // Returns the primitive's id; null, with a note, if the robot takes none.

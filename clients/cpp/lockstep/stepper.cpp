@@ -110,7 +110,7 @@ void Stepper::take_part(Duration timeout) {
     have_ = in.int64();
     newest_ = in.int64();
     if (granted_ < 0 || granted_ > kFurthest || have_ < -1 || have_ > granted_)
-      throw WireError("nobody stands there");
+      throw WireError("impossible steps");
   } catch (const WireError& error) {
     throw TypeMismatch(
         std::string("the reply to GRANT is not a grant_reply_t of this client's version: ") +

@@ -180,7 +180,7 @@ void KnownParticipants::bound_locators(const DiscoveryData& told, const Address&
       known.insert(each.locator);
     } else if (!known.contains(each.locator)) {
       each.erase();
-      warn_once("a socket tells of more than 64 addresses: the others are not used");
+      warn_once("a participant announces more than 64 addresses; the rest is ignored");
     }
   }
 }

@@ -78,12 +78,12 @@ int check(const CheckArguments& arguments) {
 
 void add_check(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
-      "check", "name everything wrong or unsupported in a world file, with file and line");
+      "check", "report every fault and unsupported element of a world file, with file and line");
   const auto arguments = std::make_shared<CheckArguments>();
   add_world_arguments(*command, arguments->world);
   command->add_flag("--json", arguments->json, "print a JSON list");
   command->add_flag("--strict", arguments->strict,
-                    "what is repaired or not supported fails the check too");
+                    "also fail on repaired and unsupported elements");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return check(*arguments); }; });
 }

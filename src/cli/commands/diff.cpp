@@ -50,7 +50,7 @@ void add_diff(CLI::App& app, Action& chosen) {
       ->type_name("PATTERN")
       ->allow_extra_args(false);
   command->add_flag("--partial", arguments->partial,
-                    "for a log that is known to be cut: what is there is compared");
+                    "accept a truncated log, and compare the messages that it has");
   command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
   command->add_option("--html", arguments->html, "write a page with plots of what differs")
       ->type_name("FILE");

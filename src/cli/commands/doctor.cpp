@@ -146,10 +146,9 @@ std::map<int64_t, std::string> servers_on(const bus::LcmUrl& url) {
 
 std::string advice_on_no_server(const bus::LcmUrl& url) {
   const bool local = url.scheme == "udpm" && url.option("ttl", "0") == "0";
-  return "none answers on " + url.str() +
-         (local ? ", which stays on this machine (another one's is asked with ?ttl=1)" : "") +
-         ": `ruedo run WORLD` starts one; where it is on another address, its LCM_DEFAULT_URL or "
-         "--lcm is wanted here";
+  return "no server answers on " + url.str() +
+         (local ? " (this machine only; ?ttl=1 reaches others)" : "") +
+         ": start one with `ruedo run WORLD`, or set LCM_DEFAULT_URL or --lcm to its address";
 }
 
 // The address that is served, or would be: by this machine's claims, and by who answers there.

@@ -102,7 +102,7 @@ void add_edit(CLI::App& app, Action& chosen) {
       ->add_option("--save-as", arguments->save_as,
                    "save to this file (default: WORLD; world.sdf for an empty floor)")
       ->type_name("FILE");
-  command->add_option("--view", arguments->view, "where the page is (default: 127.0.0.1:8080)")
+  command->add_option("--view", arguments->view, "address of the page (default: 127.0.0.1:8080)")
       ->type_name("ADDRESS:PORT");
   command
       ->add_option("--lcm", arguments->lcm,

@@ -45,7 +45,7 @@ void add_map(CLI::App& app, Action& chosen) {
   command->add_option("--resolution", arguments->resolution, "side of a cell, m")
       ->capture_default_str()
       ->check(within(0.001, 100.0));
-  command->add_option("--height", arguments->height, "where the world is cut: z, m")
+  command->add_option("--height", arguments->height, "height of the cut through the world: z, m")
       ->capture_default_str()
       ->check(within(-1e5, 1e5));
   command->callback([arguments, &chosen] { chosen = [arguments] { return map(*arguments); }; });

@@ -81,7 +81,8 @@ int show(const PlayArguments& arguments, double speed) {
   const ros2::BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
   if (!arguments.html.empty())
     return write_page(first.path(), arguments.html, arguments.html_size), kGood;
-  if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
+  if (!std::isfinite(speed))
+    throw InputError({}, "--speed max is not allowed with --view; allowed is a number");
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm cannot be used with --view: the page shows the log, and nothing is published");

@@ -36,7 +36,8 @@ void add_python_commands(CLI::App& app, Action& chosen) {
        campaigns, extras});
   add(app, chosen,
       {"why",
-       "until when a failed run could have been saved, and which single change would have saved it",
+       "find the last moment at which a failed run could have been saved, and the single changes "
+       "that save it",
        campaigns, extras});
   add(app, chosen,
       {"fit", "fit a robot's errors to logs of the real one", "ruedo.fit.cli", "'ruedo[fit]'"});

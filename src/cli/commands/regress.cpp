@@ -250,7 +250,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
       ->check(within(0.0, 3600.0));
   command
       .add_option("--timeout", a.timeout,
-                  "a run that does not go on for so long has failed (s of real time)")
+                  "fail a run that makes no progress for this long (s of real time)")
       ->type_name("S")
       ->capture_default_str()
       ->check(within(0.1, 1e6));
@@ -264,7 +264,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
 void add_expectations(CLI::App& command, RegressArguments& a) {
   command
       .add_option("--robot", a.expected.robot,
-                  "whom the expectations are about (default: the first of the world)")
+                  "robot that the expectations apply to (default: the first of the world)")
       ->type_name("NAME");
   add_list(command, "--goal", a.goals,
            "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)", "GOAL");
@@ -319,8 +319,8 @@ void add_reports(CLI::App& command, RegressArguments& a) {
 
 void add_regress(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("regress",
-                                         "run a world with a client on a port of its own, and hold "
-                                         "the run against what is expected of it");
+                                         "run a world with a client in a network of its own, and "
+                                         "check the run against expectations");
   const auto arguments = std::make_shared<RegressArguments>();
   add_world_arguments(*command, arguments->world);
   add_course(*command, *arguments);

@@ -212,7 +212,7 @@ void add_video_arguments(CLI::App& command, report::VideoArguments& arguments) {
       .add_option("--video", arguments.video,
                   "WORLD is a log: make it a video, .webm (VP8) or .mp4 (H.264)")
       ->type_name("FILE");
-  command.add_option("--follow", arguments.follow, "the camera goes along with this robot")
+  command.add_option("--follow", arguments.follow, "the camera follows this robot")
       ->type_name("ROBOT");
   command.add_option("--fps", arguments.fps, "of the video, frames per second")
       ->type_name("N")

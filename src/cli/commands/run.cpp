@@ -173,7 +173,7 @@ int strict_check(const WorldArguments& world) {
   const std::vector<Finding> findings = find_all(world, refusal);
   if (findings.empty()) return kGood;
   print_findings(findings);
-  to_stderr("ruedo: {} is not run: --strict refuses what has findings\n", world.world);
+  to_stderr("ruedo: {} is not run: --strict refuses a world with findings\n", world.world);
   return refusal == kGood ? kCheckFailed : refusal;
 }
 

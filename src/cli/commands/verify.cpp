@@ -63,14 +63,15 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
                one_line(describe(*result.difference)), one_line(so_far));
     if (same_machine) return kCheckFailed;
     fmt::print(
-        "What is not as in the log may be why: bytes hold for one version with its libraries. The "
-        "log needs Ruedo {0}: `pip install ruedo=={0}` in a virtual environment of its own, and "
-        "`ruedo verify` there.\n",
+        "The differences from the log's machine, above, may be the cause: only the same "
+        "version and libraries give the same bytes. Repeat the log with Ruedo {0}: `pip install "
+        "ruedo=={0}` in "
+        "a virtual environment of its own, and `ruedo verify` there.\n",
         one_line(header.version.substr(0, header.version.find(' '))));
     return kEnvironment;
   }
   if (result.messages == 0) {
-    fmt::print("{}: nothing was compared: there is no message to compare\n",
+    fmt::print("{}: nothing was compared: the log has no messages to compare\n",
                one_line(arguments.log));
     return kCheckFailed;
   }
@@ -107,7 +108,7 @@ void add_verify(CLI::App& app, Action& chosen) {
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
   command->add_flag("--partial", arguments->partial,
-                    "for a log that is known to be cut: what is there is compared");
+                    "accept a truncated log, and compare the messages that it has");
   add_plugin_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return verify(*arguments); }; });

@@ -76,7 +76,7 @@ void PlayedRun::end() {
   reply_t last{};
   last.run_id = run_id_;
   last.code = reply_t::ENDED;
-  last.text = "the log that was played is over";
+  last.text = "the played log has ended";
   const std::vector<uint8_t> message = engine::encoded(last);
   bus_.publish(kReplyChannel, message.data(), message.size());
   bus_.flush();

@@ -73,7 +73,7 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command
       .add_option(
           "--fault", arguments.faults,
-          "what goes wrong: [ROBOT][/TARGET]:KIND@SECONDS[,for=S][,value=V]... (docs/campaigns.md)")
+          "inject a fault: [ROBOT][/TARGET]:KIND@SECONDS[,for=S][,value=V]... (docs/campaigns.md)")
       ->type_name("FAULT")
       ->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");

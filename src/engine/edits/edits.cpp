@@ -91,7 +91,7 @@ std::string fault_of_pose(const double (&position)[3], const double (&orientatio
   double squared = 0.0;
   for (const double part : orientation) squared += part * part;
   if (!(std::abs(squared - 1.0) <= 2e-3)) {  // also false for NaN
-    return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
+    return "orientation is " + list_of(orientation) + ": expected a unit quaternion w, x, y, z";
   }
   return "";
 }
@@ -101,10 +101,10 @@ std::string fault_of_name(const std::string& name) {
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
   if (!is_one_line(name)) return "is not UTF-8 text without control characters";
   if (name == "ruedo" || world::is_reserved_name(name))
-    return "is kept for Ruedo itself; choose another";
+    return "is reserved for Ruedo; choose another";
   if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";
   if (name.find("::") != std::string::npos)
-    return "has '::', which separates names from each other";
+    return "contains '::', which separates the parts of a name";
   return "";
 }
 

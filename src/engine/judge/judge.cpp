@@ -159,7 +159,7 @@ void Judge::see_clearance(const Snapshot& snapshot) {
     return;
   const Vec3& at = nearest.other_point;
   fail("clearance", snapshot.time,
-       fmt::format("{} was {} m from {} at ({:.3f}, {:.3f}, {:.3f}), at least {:g} m are asked for",
+       fmt::format("{} was {} m from {} at ({:.3f}, {:.3f}, {:.3f}), at least {:g} m are required",
                    name_of(nearest.own), beside(nearest.distance, *expected_.clearance),
                    name_of(nearest.other), at.x(), at.y(), at.z(), *expected_.clearance));
 }
@@ -327,7 +327,7 @@ void Judge::add_odometry(Verdict& verdict) const {
     check.outcome = Outcome::failed;
     check.time = result.beyond;
     check.text =
-        fmt::format("{}'s odometry was {} m off, at most {:g} m are asked for", expected_.robot,
+        fmt::format("{}'s odometry was {} m off, at most {:g} m are allowed", expected_.robot,
                     beside(result.beyond_m, *expected_.odometry_error), *expected_.odometry_error);
   }
   verdict.checks.push_back(std::move(check));

@@ -125,8 +125,8 @@ bool Lockstep::has_room(const Member& member, size_t count, size_t bytes) const 
 
 std::string Lockstep::fault_of(const grant_request_t& grant, const Member& member) const {
   if (grant.granted != member.granted)
-    return fmt::format("granted is {}, but this client's grants stand at {}", grant.granted,
-                       member.granted);
+    return fmt::format("granted is {}, but this client has granted the steps up to {}",
+                       grant.granted, member.granted);
   if (grant.step_until < grant.granted)
     return fmt::format("step_until is {}, below granted, {}", grant.step_until, grant.granted);
   if (grant.step_until - grant.granted > kMostSteps) {

@@ -56,8 +56,8 @@ void Repeating::check_end(int64_t state_hash) const {
   const int64_t saved = replay_.end().state_hash;
   if (saved != 0 && state_hash != saved) {  // 0: saved when that state was past
     throw InputError({path()},
-                     "leads to another state here than where it was saved: its program, libraries "
-                     "or CPU are others");
+                     "leads to another state here than where it was saved: the program, libraries "
+                     "or CPU differ");
   }
 }
 

@@ -109,8 +109,8 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
           case engine::CommandInbox::Scheduled::full: return go_on_to(applied_.step);
           case engine::CommandInbox::Scheduled::late:
           case engine::CommandInbox::Scheduled::faulty:
-            damaged("its command on " + applied_.channel + " at step " +
-                    std::to_string(applied_.step) + " is none");
+            damaged("the recorded command on " + applied_.channel + " at step " +
+                    std::to_string(applied_.step) + " is not a valid message");
         }
       }
       if (!acts(applied_.kind)) {

@@ -109,7 +109,7 @@ Run::Outcome Run::reset(const request_t& request, const reset_request_t& body) {
   };
   switch (body.what) {
     case reset_request_t::ALL:
-      return body.seed < -1 ? bad("a seed is 0 or more, -1 for the one there is")
+      return body.seed < -1 ? bad("seed must be 0 or more, or -1 to keep the current one")
                             : reset_all(request, body.seed);
     case reset_request_t::TIME:
     case reset_request_t::POSES:

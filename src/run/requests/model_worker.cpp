@@ -33,8 +33,8 @@ engine::Outcome ModelWorker::add(Order order) {
         [&](const Order& other) { return other.request.session == order.request.session; });
     if (waiting_.size() >= kMostWaiting || static_cast<size_t>(of_session) >= kMostOfSession) {
       return engine::Outcome::refuse(
-          reply_t::REFUSED, std::to_string(waiting_.size()) +
-                                " models are being made ready: ask again when they are there");
+          reply_t::REFUSED,
+          std::to_string(waiting_.size()) + " models are still loading: retry when they are there");
     }
     waiting_.push_back(std::move(order));
     if (!thread_.joinable()) thread_ = std::thread([this] { work(); });

@@ -168,8 +168,8 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
     log::check_same_run(header, header_, path);
     if (repeating->steps() > kMostSteps) {
       return Outcome::refuse(reply_t::REFUSED,
-                             fmt::format("{} is {} steps from its beginning; RESTORE goes {} at "
-                                         "most, and `ruedo run --restore` as many as it takes",
+                             fmt::format("{} is {} steps from its beginning; RESTORE repeats {} at "
+                                         "most, and `ruedo run --restore` any number",
                                          path, repeating->steps(), kMostSteps));
     }
     spdlog::info("{} holds no restorable state; re-simulating {} steps (PAUSE cancels)", path,

@@ -162,7 +162,7 @@ struct Reader {
     const Pid pid = read_pid(plugin, "", 0, {1.0, 0.0, 0.0, -1.0, 1.0, -1000.0, 1000.0});
     const bool by_force = plugin.boolean("use_force_commands", false);
     if (by_force && pid.d > 0.0)
-      without_effect("d_gain", "what a rate lacks has no rate of its own here");
+      without_effect("d_gain", "the error of a rate is not differentiated");
     name_axis();
     for (const Element* written : plugin.all("joint_name")) {
       Joint* held = joint(*written);

@@ -109,20 +109,20 @@ struct Unsupported {
   const char* text;
 };
 
-constexpr const char* kNoise = "the <noise> of its sensor is what acts";
-constexpr const char* kJerk = "limits of the jerk are not kept";
-constexpr const char* kTrack = "the limits of the vehicle act";
+constexpr const char* kNoise = "the <noise> of its sensor applies";
+constexpr const char* kJerk = "the jerk is not limited";
+constexpr const char* kTrack = "the limits of the vehicle apply";
 constexpr const char* kPoses = "ROBOT/pose comes 50 times a second";
 constexpr const char* kEncoders =
-    "ROBOT/odometry is that of its wheels, and ROBOT/pose the true one";
+    "ROBOT/odometry comes from its wheels; ROBOT/pose is the true pose";
 constexpr const char* kCovariance = "odometry_t has no covariance";
 constexpr const char* kBattery = "batteries do not run down";
 constexpr const char* kCircle = "it turns as a differential drive does";
 constexpr const char* kObstacles = "nothing stops it before an obstacle";
 constexpr const char* kFloors = "ROBOT/joints shows where its cabin and its doors are";
-constexpr const char* kRange = "the <range> of its sensor is what acts";
-constexpr const char* kRate = "the <update_rate> of its sensor is what acts";
-constexpr const char* kLens = "the <camera> of its sensor is what acts";
+constexpr const char* kRange = "the <range> of its sensor applies";
+constexpr const char* kRate = "the <update_rate> of its sensor applies";
+constexpr const char* kLens = "the <camera> of its sensor applies";
 constexpr const char* kScene = "the world's <scene> says how pictures look";
 constexpr const char* kDistortion = "<distortion> in <camera> bends pictures";
 
@@ -145,7 +145,7 @@ constexpr Unsupported kUnsupported[] = {
     {"slotcar", "max_turn_acceleration", "", "it brakes its turns as it begins them"},
     {"slotcar", "stop_distance", "", kObstacles},
     {"slotcar", "stop_radius", "", kObstacles},
-    {"slotcar", "reversible", "true 1", "it drives backwards where it is told to"},
+    {"slotcar", "reversible", "true 1", "it also drives backwards"},
     {"slotcar", "steering", "diff_drive", kCircle},
     {"slotcar", "min_turning_radius", "", kCircle},
     {"slotcar", "nominal_voltage", "", kBattery},
@@ -155,13 +155,13 @@ constexpr Unsupported kUnsupported[] = {
     {"slotcar", "mass", "", kBattery},
     {"slotcar", "inertia", "", kBattery},
     {"slotcar", "friction_coefficient", "", kBattery},
-    {"DetachableJoint", "output_topic", "", "what it holds is not told"},
+    {"DetachableJoint", "output_topic", "", "it does not publish what it holds"},
     {"PosePublisher", "update_frequency", "50", kPoses},
     {"PosePublisher", "static_update_frequency", "50", kPoses},
     {"JointStatePublisher", "update_rate", "0", "ROBOT/joints has its own rate"},
     {"Magnetometer", "use_units_gauss", "false 0", "magnetometer_t is in T"},
     {"Magnetometer", "use_earth_frame_ned", "false 0", "the world's axes are its own"},
-    {"Physics", "engine", "", "Ruedo's own physics is what acts"},
+    {"Physics", "engine", "", "Ruedo uses its own physics"},
     {"Sensors", "background_color", "", kScene},
     {"Sensors", "ambient_light", "", kScene},
     {"Sensors", "disable_on_drained_battery", "false 0", "batteries do not run down"},
@@ -170,15 +170,16 @@ constexpr Unsupported kUnsupported[] = {
     {"", "covariance_x", "0", kCovariance},
     {"", "covariance_y", "0", kCovariance},
     {"", "covariance_yaw", "0", kCovariance},
-    {"gazebo_ros_planar_move", "cmdTimeout", "-1 0", "Ruedo's watchdog is what acts"},
-    {"gazebo_ros_planar_move", "cmd_timeout", "-1 0", "Ruedo's watchdog is what acts"},
+    {"gazebo_ros_planar_move", "cmdTimeout", "-1 0", "Ruedo's watchdog applies"},
+    {"gazebo_ros_planar_move", "cmd_timeout", "-1 0", "Ruedo's watchdog applies"},
     {"gazebo_ros_joint_state_publisher", "updateRate", "0", "ROBOT/joints has its own rate"},
     {"gazebo_ros_joint_state_publisher", "update_rate", "0", "ROBOT/joints has its own rate"},
-    {"gazebo_ros_imu", "initialOrientationAsReference", "false 0", "it is that in the world"},
+    {"gazebo_ros_imu", "initialOrientationAsReference", "false 0",
+     "the orientation is relative to the world"},
     {"gazebo_ros_imu_sensor", "initialOrientationAsReference", "false 0",
-     "the orientation is that in the world"},
+     "the orientation is relative to the world"},
     {"gazebo_ros_imu_sensor", "initial_orientation_as_reference", "false 0",
-     "the orientation is that in the world"},
+     "the orientation is relative to the world"},
     {"gazebo_ros_imu_sensor", "gaussianNoise", "0", kNoise},
     {"gazebo_ros_imu_sensor", "gaussian_noise", "0", kNoise},
     {"gazebo_ros_imu_sensor", "updateRateHZ", "0", kRate},

@@ -414,7 +414,7 @@ void name_what_has_no_effect(const Controller& controller, const std::string& wh
     const std::string at = axis;
     if (const Element* has = parameter(controller, {(at + ".has_jerk_limits").c_str()});
         is_true(has))
-      name(has, "limits of the jerk are not kept");
+      name(has, "the jerk is not limited");
     const auto fastest = limit_in(parameter(controller, {(at + ".max_velocity").c_str()}));
     const Element* slowest = parameter(controller, {(at + ".min_velocity").c_str()});
     const auto backwards = limit_in(slowest, true);

@@ -185,7 +185,7 @@ void make_pose(const Made& made) {
       frame->text.find("map") == std::string::npos && frame->text.find("odom") == std::string::npos)
     made.findings.unsupported(frame->source, made.where,
                               "<" + frame->name + "> '" + frame->text +
-                                  "' is not supported: the pose is that in the world");
+                                  "' is not supported: the pose is relative to the world");
 }
 
 void make_force_torque(const Made& made) {
@@ -231,9 +231,10 @@ void make_touch(const Made& made) {
     add(made.sensor, "ruedo:collision", each->text);
   name_by_topic(made.plugin.string("namespace", ""), made.sensor);
   if (!made.plugin.boolean("enabled", false))
-    made.findings.unsupported(made.plugin.source, made.where,
-                              "the plugin TouchPlugin is enabled from the start: the service that "
-                              "would enable it is not there");
+    made.findings.unsupported(
+        made.plugin.source, made.where,
+        "the plugin TouchPlugin is enabled from the start: Ruedo has no service "
+        "that enables it");
 }
 
 void make_detector(const Made& made) {

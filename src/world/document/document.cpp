@@ -126,7 +126,7 @@ std::string what_is_wrong(const tinyxml2::XMLDocument& xml) {
   switch (xml.ErrorID()) {
     case XML_ERROR_EMPTY_DOCUMENT: return "the file is empty";
     case XML_ERROR_MISMATCHED_ELEMENT:
-      return "not XML: this element is closed by another name, or not at all";
+      return "not XML: this element has no closing tag of the same name";
     case XML_ERROR_PARSING_ELEMENT: return "not XML: an element that is not complete";
     case XML_ERROR_PARSING_ATTRIBUTE: return "not XML: an attribute that is not complete";
     case XML_ERROR_PARSING_TEXT: return "not XML: text that never ends";

@@ -527,8 +527,8 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
   if (wheels && !drive.on_odometry)
     e.child("ruedo:primitives")
         ->fail(
-            "'truth' is not allowed with wheels: a robot knows its wheels only; allowed is "
-            "odometry");
+            "'truth' is not allowed with the wheels drive, whose primitives end by odometry; "
+            "allowed is odometry");
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);
   if (odometry) {
@@ -571,8 +571,8 @@ void name_lone_tracks(const std::vector<const Element*>& plugins, const Model& m
                                    [&](auto belt) { return model.links[belt].name == link; });
     if (!driven)
       findings.unsupported(each->source, where,
-                           "the plugin TrackController does nothing here: its belt would run as it "
-                           "is told; <ruedo:belt> has one run");
+                           "the plugin TrackController has no effect here: its belt would follow "
+                           "commands; <ruedo:belt> has a fixed velocity");
   }
 }
 

@@ -213,7 +213,7 @@ void read_lifts(const std::vector<const Element*>& plugins, const std::string& w
     const std::string name = kind_of(*plugin).name;
     for (const Kind& kind : kKinds) {
       if (name != kind.plugin) continue;
-      read_or_leave_out(where, "it takes no calls", findings,
+      read_or_leave_out(where, "it ignores calls", findings,
                         [&] { (Reader{*plugin, where, findings, model}.*kind.read)(); });
     }
   }

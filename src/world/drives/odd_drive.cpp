@@ -105,7 +105,8 @@ class Look {
     if (drive_.kind == DriveDescription::Kind::wheels)
       findings_.error(joint.source, where_, text);
     else
-      findings_.repaired(joint.source, where_, text + "; the robot drives as if it could");
+      findings_.repaired(joint.source, where_,
+                         text + "; the kinematic drive moves the robot regardless");
   }
 
   const Model& model_;

@@ -74,7 +74,7 @@ void read_environment(const Element& world, Environment& environment, Findings& 
     if (const Element* element = world.child(name))
       read_or_leave_out("world/" + element->name, instead, findings, [&] { read(*element); });
   };
-  part("spherical_coordinates", "the world lies nowhere on Earth",
+  part("spherical_coordinates", "the world has no place on Earth",
        [&](const Element& place) { read_place(place, environment, findings); });
   part("atmosphere", "the air is the standard atmosphere",
        [&](const Element& air) { read_air(air, environment); });

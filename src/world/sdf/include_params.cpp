@@ -97,7 +97,7 @@ class Changes {
 
   void add(const Element& change, Element& to) {
     if (name_of(change).empty() && change.attribute("element_id"))
-      return skip(change, "what is to be added has no name");
+      return skip(change, "the element to add has no name");
     if (!name_of(change).empty() && same_child(to, change))
       return skip(change, "'" + name_of(change) + "' is there already");
     to.children.push_back(as_written(change));
@@ -118,7 +118,7 @@ class Changes {
       if (const Element* there = same_child(element, *child))
         remove(element, there);
       else
-        skip(*child, "there is none to be removed");
+        skip(*child, "there is no such element to remove");
     }
   }
 
@@ -127,7 +127,7 @@ class Changes {
     if (!action) return skip(child, "has no action, nor has the element around it");
     if (*action == "add") return add(child, element);
     Element* there = same_child(element, child);
-    if (!there) return skip(child, "there is none in '" + name_of(element) + "'");
+    if (!there) return skip(child, "'" + name_of(element) + "' has no such element");
     if (*action == "remove")
       remove(element, there);
     else

@@ -196,13 +196,13 @@ void report_not_found(const Element& element, const std::string& uri, const std:
   if (uri.rfind("https://fuel.", 0) == 0 || uri.rfind("http://fuel.", 0) == 0) {
     context.findings.error(element.source,
                            where + " " + uri,  // one text, so that all are reported as one list
-                           "models of Fuel that are not here; the world goes on without them. "
+                           "models of Fuel are not on this machine; the world runs without them. "
                            "`gz fuel download -u URI` fetches each");
     return;
   }
   context.findings.error(element.source, where,
                          "'" + uri + "' " + context.resources.why_not(uri, element.source.file) +
-                             "; the world goes on without it");
+                             "; the world runs without it");
 }
 
 // The model, placed by <pose> and <placement_frame> of the <include>.

@@ -92,7 +92,7 @@ std::vector<const Element*> read_performers(const Element& world, const std::str
     if (!has_levels(*plugin)) continue;
     if (const Element* level = plugin->child("level"))
       findings.unsupported(level->source, where,
-                           "levels are not supported: all of the world is there always");
+                           "levels are not supported: the whole world is always loaded");
     for (const Element* each : plugin->all("performer")) {
       read_or_leave_out(where, "the performer is left out", findings, [&] {
         const Element* size = each->child("geometry/box/size");
@@ -439,7 +439,7 @@ class SdfReader::WorldReader {
     for (const Element* frame : element_.all("frame")) {
       const std::string* name = frame->attribute("name");
       if (name && frames_.has(*name))
-        read_or_leave_out(in_world_, "nothing is there", findings_,
+        read_or_leave_out(in_world_, "the frame is left out", findings_,
                           [&] { frames_.pose(*name, *frame); });
     }
   }
@@ -474,11 +474,11 @@ class SdfReader::WorldReader {
                            "spherical_coordinates", "ruedo:fleet", "ruedo:crowd", "ruedo:fault"},
                           {"gui", "wind", "audio", "plugin", "state", "population"}, in_world_,
                           findings_);
-    read_or_leave_out(in_world_, "what is usual is taken", findings_,
+    read_or_leave_out(in_world_, "the defaults are used", findings_,
                       [&] { read_physics(element_, world_, findings_); });
     read_environment(element_, world_.environment, findings_);
     if (const Element* scene = element_.child("scene"))
-      read_or_leave_out(in_world_, "what is usual is taken", findings_,
+      read_or_leave_out(in_world_, "the defaults are used", findings_,
                         [&] { read_scene(*scene, world_.sky, findings_); });
     world_.viewpoint = read_viewpoint(element_, in_world_, findings_);
     name_what_has_no_effect(element_, in_world_, findings_);

@@ -160,8 +160,8 @@ class Repair {
     struct Quantity {
       const char *element, *attribute, *instead, *text;
     };
-    constexpr Quantity kAll[] = {{"dynamics", "damping", "0", "there is none"},
-                                 {"dynamics", "friction", "0", "there is none"},
+    constexpr Quantity kAll[] = {{"dynamics", "damping", "0", "0 is used"},
+                                 {"dynamics", "friction", "0", "0 is used"},
                                  {"limit", "effort", "0", "there is no limit"},
                                  {"limit", "velocity", "0", "there is no limit"}};
     for (const Quantity& each : kAll) {
@@ -216,10 +216,11 @@ class Repair {
                                     [](const auto& each) { return each.first == "type"; });
     const std::string written = found == joint.attributes.end() ? "" : found->second;
     if (kTypes.count(written) == 0) {
-      findings_.error(joint.source, "joint " + name_of(joint),
-                      "type '" + written +
-                          "' is none; allowed are fixed, revolute, continuous, prismatic, planar "
-                          "and floating; it is taken as fixed");
+      findings_.error(
+          joint.source, "joint " + name_of(joint),
+          "type '" + written +
+              "' is unknown; allowed are fixed, revolute, continuous, prismatic, planar "
+              "and floating; it is taken as fixed");
       if (found == joint.attributes.end())
         joint.attributes.emplace_back("type", "fixed");
       else
@@ -252,8 +253,9 @@ class Repair {
     });
     const std::set<const Element*> circular = closing_circles();
     leave_out([&](const Element& joint) -> std::string {
-      return circular.count(&joint) == 0 ? ""
-                                         : "'" + end_of(joint, "child") + "' would hang on itself";
+      return circular.count(&joint) == 0
+                 ? ""
+                 : "'" + end_of(joint, "child") + "' would be its own ancestor";
     });
   }
 
@@ -316,7 +318,7 @@ class Repair {
         all.begin(), all.end(), [&](const auto& a, const auto& b) { return sizes[a] < sizes[b]; });
     leave_out([&](const Element& each) -> std::string {
       const std::string link = each.name == "link" ? name_of(each) : end_of(each, "child");
-      return one_of(link) == kept ? "" : "does not hang on '" + kept + "'";
+      return one_of(link) == kept ? "" : "is not connected to '" + kept + "'";
     });
   }
 

@@ -25,7 +25,7 @@ export class Bar {
   private readonly resetButton: HTMLButtonElement;
   private readonly rate = h(
     "select",
-    { title: "sim time per real time that is asked for", "aria-label": "rate" },
+    { title: "requested sim time per real time", "aria-label": "rate" },
     // Shown until the user chooses a rate; the actual one stands beside it
     h("option", { value: "", hidden: true }, "rate"),
     ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) =>

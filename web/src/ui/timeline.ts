@@ -44,7 +44,7 @@ export class Timeline {
     this.button = iconButton("play", "play (space)", () => this.toggle());
     this.live = h(
       "button",
-      { id: "live", title: "what runs now (End)", click: () => actions.live() },
+      { id: "live", title: "the live run (End)", click: () => actions.live() },
       "Live",
     );
     this.speed.value = "1";
@@ -109,7 +109,7 @@ export class Timeline {
 
   // Shown in the past of a run.
   private branch(): HTMLElement {
-    const title = "a second run that goes on from here",
+    const title = "a second run that continues from here",
       button = h("button", { id: "branch", title, click: () => this.actions.branch() }, "Branch");
     this.page.watch(["past", "hello"], ({ past, hello }) => {
       button.hidden = !past || hello?.mode !== "live";
@@ -159,7 +159,7 @@ export class Timeline {
     this.button.replaceChildren(icon(shown.playing ? "pause" : "play"));
     const title =
       isLive && !past
-        ? "stop here; the run goes on"
+        ? "stop here; the run continues"
         : shown.playing
           ? "pause (space)"
           : "play (space)";

@@ -16,7 +16,7 @@ export function showCommand(heading: string, command: string): void {
     "dialog",
     { class: "confirm", "aria-labelledby": "command-heading" },
     h("h2", { id: "command-heading" }, heading),
-    h("p", {}, "A second run goes on from there:"),
+    h("p", {}, "A second run continues from there:"),
     h("p", {}, text),
     h("form", { method: "dialog", class: "row" }, copy, h("button", { value: "" }, "Close (Esc)")),
   );

@@ -262,7 +262,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         checkOpen();
         if (lockstep())
             throw new RuedoException.NotSupported(
-                    "in lockstep nothing goes on without its clients: use sim.step(n)");
+                    "in lockstep, only sim.step(n) advances time");
         long begin = clock.utime();
         long following = (begin / period + 1) * period;
         boolean inTime = begin < next[0] + period && next[0] + period <= following;

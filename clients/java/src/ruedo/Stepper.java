@@ -214,7 +214,7 @@ final class Stepper {
                 have = in.int64();
                 newest = in.int64();
                 if (granted < 0 || granted > FURTHEST || have < -1 || have > granted)
-                    throw new IOException("nobody stands there");
+                    throw new IOException("impossible steps");
             } catch (IOException error) {
                 throw new RuedoException.TypeMismatch(
                         "the reply to GRANT is not a grant_reply_t of this client's version");

@@ -43,7 +43,7 @@ std::string file_of_bag(const std::string& folder) {
   if (files.size() == 1) return files.front();
   if (is_sqlite)
     throw InputError({folder},
-                     "is a bag with the storage sqlite3; what is read is MCAP, as `ruedo "
+                     "is a bag with the storage sqlite3; Ruedo reads MCAP, as `ruedo "
                      "export --ros2` writes it");
   throw InputError({folder}, fmt::format("is a folder{}; allowed is a log, or a ROS 2 bag, whose "
                                          "folder has one .mcap file, and this has {}",

@@ -39,7 +39,7 @@ struct Row {
 constexpr Row kRows[] = {
     {"fault", text, false, "the last fault that was set here; each acts from then on",
      "[ROBOT][/TARGET]:KIND[,for=S][,value=V]..., as of ruedo run --fault, without a time"},
-    {"paused", boolean, false, "whether sim time stands still"},
+    {"paused", boolean, false, "whether the simulation is paused"},
     {"rate", real, false, "sim time per real time", "0.0001 to 1e6; .inf: as fast as it goes"},
     {"seed", integer, true, "of all random numbers of the run"},
     {"step_size", real, true, "length of a step, s"},
