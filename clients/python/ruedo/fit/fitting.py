@@ -17,6 +17,7 @@ from ..launch import find_ruedo
 from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal
+from .motion import fit_motion
 from .odometry import OdometryFit, fit_odometry
 from .rangefinder import BeamModel, fit_rangefinder
 from .recording import Array, Geometry, Recording, body_steps
@@ -124,6 +125,8 @@ def fit(
     _fit_drive(answer, robot)
     if any(one.scans is not None for one in recordings):
         _fit_scans(answer, robot, mount)
+    if motion := fit_motion(recordings[0]):
+        answer.parts["Motion"] = motion
     if timing := fit_timing(recordings):
         answer.parts["Timing"] = timing
     if recordings[0].imu is not None:
