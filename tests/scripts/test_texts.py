@@ -24,6 +24,14 @@ RIDDLES = {
     r"\bwants (?:a|an|the|finite)\b": "needs",
     r"\bis none of\b": "is not one of",
     r"\btells more\b": "explains",
+    r"\bis none\b": "is not a ..., is unknown",
+    r"\b(?:is|are) wanted\b": "expected ...",
+    r"\basked for\b": "required, requested, on first use",
+    r"\b(?:is|be) told\b": "is commanded, reports",
+    r"\bis that in\b": "is relative to",
+    r"\bgoes on\b": "continues",
+    r"\bnobody stands\b": "impossible steps",
+    r"\bwhat acts\b": "applies, is used",
 }
 
 

@@ -16,7 +16,7 @@ Use        Simulation         robots, time, sleep, step, pause, reset, spawn, se
            Robot              set_velocity, stop, advance, rotate, turn_to, arc; its sensors
            Device, Stream     latest(), next(), on_sample() of a sensor
            Motion             wait(), done, reason of a primitive
-           Command            what acts at a step of lockstep
+           Command            a command for a step of lockstep
 Samples    Scan, Odometry, Pose, Image, Imu, ...: fields with units
 Logs       open_log(file)     arrays by channel and time; read_log(file) gives data frames
            load_map(file)     an occupancy map
@@ -90,13 +90,13 @@ if TYPE_CHECKING:
 
 
 def __dir__() -> list[str]:
-    """What users should see."""
+    """The names that users should see."""
     return sorted([*__all__, "__version__"])
 
 
 def _late(name: str) -> object:
-    """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
-    it is first asked for.
+    """``ruedo.Engine`` and its snapshots need the compiled part of the package: loaded on first
+    use.
     """
     if not _HAS_NUMPY and not name.startswith("_"):
         raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")

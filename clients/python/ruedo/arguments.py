@@ -27,7 +27,7 @@ _MOST_SHOWN = 100  # characters
 
 
 def shown(value: Any) -> str:
-    """For messages: how the value would be written, the beginning of it."""
+    """The beginning of a value's repr, for error messages."""
     written = repr(value)
     return written if len(written) <= _MOST_SHOWN else f"{written[:_MOST_SHOWN]}..."
 
@@ -52,13 +52,13 @@ def texts(what: str, value: Any) -> list[str]:
     given = list(value)
     for one in given:
         if not isinstance(one, str):
-            raise TypeError(f"{what} is a list of texts; {shown(one)} is none")
+            raise TypeError(f"{what} is a list of texts; {shown(one)} is not a text")
         text(what, one)
     return given
 
 
 def named(what: str, value: Any, example: str) -> dict[str, Any]:
-    """What belongs to each name; None: nothing. Raises TypeError."""
+    """A mapping as {name: value}; None: empty. Raises TypeError."""
     if value is None:
         return {}
     if not isinstance(value, Mapping):
@@ -94,7 +94,7 @@ def word(what: str, value: Any) -> str:
 
 
 def _held(what: str, value: str, encode: Callable[[str], bytes]) -> str:
-    """What C can hold. Raises ValueError."""
+    """A text without NUL bytes, as C can hold it. Raises ValueError."""
     try:
         encode(value)
     except UnicodeEncodeError:
@@ -105,7 +105,7 @@ def _held(what: str, value: str, encode: Callable[[str], bytes]) -> str:
 
 
 def path(what: str, value: Any) -> str:
-    """Of a file or folder. Raises TypeError and ValueError."""
+    """The path of a file or folder. Raises TypeError and ValueError."""
     given = word(what, value)
     if not given:
         raise ValueError(f"{what} is an empty text: it must be a path")
@@ -113,7 +113,7 @@ def path(what: str, value: Any) -> str:
 
 
 def client_name(value: Any) -> str:
-    """What a server takes as a client's name. Raises TypeError and ValueError."""
+    """A client's name that a server accepts. Raises TypeError and ValueError."""
     name = text("name", value)
     if len(name) > MOST_NAME or not 1 <= len(name.encode()) <= MOST_NAME or CONTROL.search(name):
         raise ValueError(

@@ -41,8 +41,8 @@ class Twist(NamedTuple):
 @dataclass(frozen=True)
 class Body:
     """A set of links that do not move against each other, from ``sim.bodies``; or a model, from
-    ``sim.body("crate")``. Each property asks the server for the state as it is then, and raises
-    what a request does.
+    ``sim.body("crate")``. Each property requests the current state from the server, and raises the
+    errors of a request.
     """
 
     name: str  # MODEL/LINK, or MODEL

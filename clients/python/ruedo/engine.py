@@ -49,7 +49,7 @@ _MOST_FIELD = 1000  # characters of DEVICE.FIELD
 
 
 class Saved:
-    """What an engine keeps of its past: it does not change, so that copies of it are itself, and
+    """A saved state of an engine: it does not change, so that copies of it are itself, and
     does not leave the process.
     """
 
@@ -214,7 +214,7 @@ class Engine:
 
     @property
     def findings(self) -> list[str]:
-        """What of the world file is not supported, or was repaired: file, line, element, what was
+        """Unsupported and repaired elements of the world file: file, line, element, what was
         done.
         """
         return self._core.findings()
@@ -438,7 +438,7 @@ class Engine:
             self._seeds[index] = saved.seed
 
     def drawn(self, world: int = 0) -> dict[str, float]:
-        """What was drawn for a copy, by target, from ``randomize`` and its seed.
+        """The values drawn for a copy, by target, from ``randomize`` and its seed.
 
         Targets are MODEL.x, .y, .z and .yaw (where it stands at the start), MODEL.mass (a factor),
         MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``settings``; "*" in
@@ -525,7 +525,7 @@ def _made(world: bytes, **given: Any) -> Any:
 
 
 def _bytes_of(message: Any) -> bytes:
-    """Of one of ruedo.lcmtypes, or as they are."""
+    """The bytes of a message of ruedo.lcmtypes, or the given bytes."""
     if isinstance(message, bytes):
         return message
     if isinstance(message, str) or not hasattr(message, "encode"):

@@ -1,4 +1,4 @@
-"""What can go wrong, in words that say what to do next.
+"""The errors of this package; their texts say what to do next.
 
 Every error of this package is a RuedoError, and can be pickled: a pool of processes hands it on.
 Bad arguments (NaN, a radius of 0) are plain ValueErrors.
@@ -86,6 +86,6 @@ class RequestError(RuedoError):
 
 
 class LeaseLost(RequestError):
-    """Lockstep goes on without this client, which was silent for too long; the next step() takes
+    """Lockstep continues without this client, which was silent for too long; the next step() takes
     part again.
     """

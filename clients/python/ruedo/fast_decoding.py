@@ -1,4 +1,6 @@
-"""What controllers read most, from the bytes: lcm-gen's classes take several times as long."""
+"""Fast decoders for the messages that controllers read most: lcm-gen's classes take several times
+as long.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,7 @@ def _empty(dtype: Any) -> NDArray[Any]:
 
 @lru_cache(maxsize=256)
 def _angles(first: float, step: float, count: int) -> Floats:
-    """The same array for all scans of a device: nobody can write into it."""
+    """The angles of all scans of a device, one read-only array."""
     return steps(first, step, count)
 
 

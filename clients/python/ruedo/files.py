@@ -30,7 +30,7 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
 
 
 def open_lock(path: str | os.PathLike[str]) -> int:
-    """The descriptor of a regular file to be locked, made where there is none. Raises OSError."""
+    """The descriptor of a regular file to lock; creates the file if necessary. Raises OSError."""
     file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     if stat.S_ISREG(os.fstat(file).st_mode):
         return file
@@ -75,7 +75,7 @@ def parse_yaml(text: str) -> tuple[Any, Any]:
 
 
 def dump_yaml(content: Any) -> str:
-    """What parse_yaml() reads as the same."""
+    """YAML text that parse_yaml() reads as the same value."""
     import yaml
 
     dumper = _with_exponents(yaml.SafeDumper)
@@ -126,7 +126,7 @@ def _check_number(node: Any) -> None:
 
 
 def _check_value(node: Any) -> None:
-    """A tag may stand before what it cannot be: `!!bool maybe`."""
+    """Checks a tagged value, since a tag may contradict it: `!!bool maybe`."""
     import yaml
 
     try:

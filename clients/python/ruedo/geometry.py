@@ -1,4 +1,4 @@
-"""Where devices and robots are: rotations and frames."""
+"""Rotations and frames of devices and robots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 class Placed(Protocol):
-    """What has a place in another frame: a device in base_link, a robot's pose in the world."""
+    """A thing with a pose in another frame: a device in base_link, a robot in the world."""
 
     @property
     def position(self) -> Floats: ...  # (3,) m
@@ -38,7 +38,7 @@ def rotation(orientation: Floats) -> Floats:
 def transformed(points: Floats, by: Placed) -> Floats:
     """(n, 3) points of a frame that is placed so, in the frame above. Raises TypeError."""
     if not hasattr(by, "orientation") or not hasattr(by, "position"):
-        raise TypeError(f"a device or a pose is wanted, such as robot.lrf, not {by!r}")
+        raise TypeError(f"expected a device or a pose, such as robot.lrf, not {by!r}")
     return points @ rotation(by.orientation).T + by.position
 
 

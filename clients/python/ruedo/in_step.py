@@ -41,7 +41,7 @@ class Every:
         connection = self._connection
         connection.check_open()
         if connection.in_lockstep:
-            raise NotSupported("in lockstep nothing goes on without its clients: use sim.step(n)")
+            raise NotSupported("in lockstep, only sim.step(n) advances time")
         begin = connection.clock.utime
         following = (begin // self._period + 1) * self._period
         if not begin < self._next + self._period <= following:  # the first, late, or a reset

@@ -114,7 +114,7 @@ class JointStream(Stream[Joints]):
 
     @property
     def names(self) -> list[str]:
-        """Of all joints, in the order of the samples."""
+        """The names of all joints, in the order of the samples."""
         return list(limits_of(self._link, self._of_robot.name).names)
 
 

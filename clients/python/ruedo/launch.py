@@ -126,7 +126,7 @@ def launch(
 
 
 def _joined(server: _Server, url: str, name: str, timeout: float, page: str | None) -> Simulation:
-    """Ends the server where that fails. Raises LaunchError with what it said."""
+    """Joins the server; ends it if that fails. Raises LaunchError with the server's output."""
     until = time.monotonic() + timeout
     try:
         server.await_port(url, until)
@@ -173,7 +173,7 @@ def _world_file(
 
 
 def _address(url: str | None) -> tuple[str, socket.socket | _Folder | None]:
-    """Where the server listens, and what keeps that place free until it does."""
+    """The server's address, and the socket that reserves it until the server listens."""
     if url == "auto":
         token, url = _free_url()
         return url, token
@@ -219,7 +219,7 @@ def _check_list(name: str, several: Any) -> None:
         raise TypeError(f"{name} is a list of texts, not {arguments.shown(several)}")
     for one in several:
         if not isinstance(one, (str, os.PathLike)):
-            raise TypeError(f"{name} is a list of texts; {arguments.shown(one)} is none")
+            raise TypeError(f"{name} is a list of texts; {arguments.shown(one)} is not a text")
 
 
 def _more_options(
@@ -228,7 +228,7 @@ def _more_options(
     record: str | os.PathLike[str] | None,
     snapshots: str | os.PathLike[str] | None,
 ) -> list[str]:
-    """Of `ruedo run`."""
+    """Options of `ruedo run`."""
     options = ["--paused"] * arguments.switch("paused", paused)
     if duration is not None:
         options += ["--duration", str(arguments.finite("duration", duration, 0.0))]
@@ -248,7 +248,7 @@ def _options(
     settings: Mapping[str, object] | None,
     noise: bool,
 ) -> list[str]:
-    """Of `ruedo run`."""
+    """Options of `ruedo run`."""
     for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
         _check_list(name, several)
     if settings is not None and not isinstance(settings, Mapping):
@@ -371,7 +371,7 @@ class _Server:
                 os.write(pipe.fileno(), line.encode())
 
     def warnings(self) -> list[str]:
-        """What the server has warned of since the last call, each once."""
+        """The server's warnings since the last call, each once."""
         output = self._output
         if output is None:
             return []

@@ -92,7 +92,8 @@ class Message(NamedTuple):
 
 
 class Observations(State):
-    """What step() saw: the state after its last step, and the sensor messages of all its steps.
+    """The result of step(): the state after its last step, and the sensor messages of all its
+    steps.
 
     messages: in the order in which the simulation made them; empty when a paused simulation is
     stepped.
@@ -131,7 +132,7 @@ class Observations(State):
         """Sorted once: a fleet asks for each of its robots."""
         if not hasattr(stream, "channel"):
             raise TypeError(
-                f"a device or stream is wanted, such as sim.robot('p3at').lrf, not {shown(stream)}"
+                f"expected a device or stream, such as sim.robot('p3at').lrf, not {shown(stream)}"
             )
         by_channel: dict[str, list[bytes]] | None = self.__dict__.get("_by_channel")
         if by_channel is None:
@@ -169,7 +170,7 @@ def observed(
 
 
 class _Entry:
-    """Of a manifest. data: as much as is here; None: nothing."""
+    """An entry of a manifest. data: the bytes received so far; None: nothing."""
 
     __slots__ = ("channel", "crc", "data", "here", "sequence", "size")
 
@@ -253,7 +254,7 @@ class Stepper:
         for command in commands:
             if not isinstance(command, Command):
                 raise TypeError(
-                    f"commands are made by robot.velocity_command() and the like; {shown(command)} is none"
+                    f"expected a command, as robot.velocity_command() makes it, not {shown(command)}"
                 )
             if not 0 <= command.after < n:
                 raise ValueError(
@@ -292,7 +293,7 @@ class Stepper:
             return self._collect()
 
     def whose_turn(self) -> str:
-        """For whose grant the run waits, as far as this client knows."""
+        """The clients whose grants the run waits for, as far as this client knows."""
         session = self._connection.session
         name = session.name.decode()
         if not self._part:
@@ -326,7 +327,7 @@ class Stepper:
         try:
             stands = decode(lcmtypes.grant_reply_t, reply.body)
             if not -1 <= stands.received <= stands.granted or not 0 <= stands.granted <= _FURTHEST:
-                raise ValueError("where nobody stands")
+                raise ValueError("impossible steps")
         except Exception:
             raise TypeMismatch(
                 "the reply to GRANT is not a grant_reply_t of this client's version"
@@ -387,8 +388,8 @@ class Stepper:
         return b"".join(parts)
 
     def _wait(self, until: int, timeout: float) -> None:
-        """Until the states up to `until` are here with all their messages. After a silence the
-        grant, or the request for what is missing, goes out again, sooner at first."""
+        """Waits for the states up to `until` with all their messages. After a silence it repeats the
+        grant, or the request for missing messages, sooner at first."""
         if self._taken and self._have >= until:
             return
         first = _LAST_REPEAT if self._connection.bus.loses_nothing else _FIRST_REPEAT
@@ -443,13 +444,12 @@ class Stepper:
                         )
 
     def _forget_steps(self) -> None:
-        """Those that are not here; they are asked for."""
+        """Forgets all steps that this client does not have yet; RESEND requests them."""
         self._steps.clear()
         self._listed = 0
 
     def _doubt(self) -> None:
-        """Of what stands between this client and the next step some may not be the server's: all of
-        it is asked for anew."""
+        """Some data of the next steps may not be the server's: requests all of it anew."""
         self._forget_steps()
         self._newest = self._have
         self._taken = not self._grant[2]
@@ -503,7 +503,7 @@ class Stepper:
     # Putting ticks and messages together, as they come: in any order, twice, or not at all.
 
     def _sort(self) -> None:
-        """What came since the last tick, into its places."""
+        """Sorts the messages since the last tick into their steps."""
         while self._fresh:
             name, data = self._fresh.popleft()
             if (channel := self._indices.get(name)) is not None:
@@ -530,7 +530,7 @@ class Stepper:
             self._early_bytes = 0
 
     def note_arrived(self, arrived: arrivals.Arrived) -> None:
-        """What came at once, of all channels."""
+        """Counts messages that arrived together, of all channels; too many are dropped."""
         self._fresh_bytes += sum([len(data) for _, data in arrived])
         if self._fresh_bytes > _MOST_BYTES:
             self._fresh.clear()

@@ -65,7 +65,7 @@ def events(path: str | os.PathLike[str]) -> Iterator[Event]:
 
 
 class LogChannel(NamedTuple):
-    """What a log has on a channel."""
+    """A channel of a log."""
 
     type: str  # "pose_t"; "" where it is none of Ruedo's
     messages: int
@@ -74,7 +74,7 @@ class LogChannel(NamedTuple):
 
 
 class Log:
-    """A recorded run. Nothing is read before it is asked for: a log of any size is opened at once,
+    """A recorded run. Reads on demand: a log of any size is opened at once,
     and its channels are read one by one, in memory for what is returned. In a log that is damaged
     or was cut off, what is there before is read, which is logged as a warning.
 
@@ -101,7 +101,7 @@ class Log:
 
     @functools.cached_property
     def channels(self) -> dict[str, LogChannel]:
-        """What there is, by channel: read once, the heads of all messages."""
+        """The channels of the log, from the headers of all messages, read once."""
         return _summary(self.path)
 
     def columns(
@@ -170,7 +170,7 @@ def read_log(
     and values (`log["p3at/pose"]["position"]` has arrays (3,)); of what no stream delivers, such as
     ruedo/header, the members of the message.
 
-    channels: those that are wanted, None: all whose type is one of Ruedo's. begin, end: only the
+    channels: the channels to read; None: all whose type is one of Ruedo's. begin, end: only the
     messages of these times (s). raw: the members of the message for all of them. A log that is
     damaged or was cut off is read up to there and no further, which is logged as a warning.
 

@@ -82,8 +82,8 @@ class Map:
 
     def distance_field(self) -> Floats:
         """(rows, columns) m from the middle of each cell to that of the nearest occupied one: 0 in
-        it, +inf where there is none. Exact (Felzenszwalb and Huttenlocher 2012, by rows and then
-        columns).
+        an occupied cell, +inf on a map without one. Exact (Felzenszwalb and Huttenlocher 2012, by
+        rows and then columns).
         """
         taken = self.cells == OCCUPIED
         rows, columns = taken.shape
@@ -230,7 +230,7 @@ def load_map(path: str | os.PathLike[str]) -> Map:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: {error}") from None
     if not isinstance(head, dict):
-        raise ValueError(f"{file}: a map of image, resolution and origin is wanted")
+        raise ValueError(f"{file}: expected a map with image, resolution and origin")
     missing = [key for key in ("image", "resolution", "origin") if key not in head]
     if missing:
         raise ValueError(f"{file}: {', '.join(missing)} is missing")
@@ -241,7 +241,7 @@ def load_map(path: str | os.PathLike[str]) -> Map:
         and all(isinstance(one, (int, float)) and abs(one) <= FARTHEST for one in origin)
     ):
         raise ValueError(
-            f"{file}: origin is {origin!r:.100}: three numbers are wanted, x, y and heading"
+            f"{file}: origin is {origin!r:.100}: expected three numbers: x, y and heading"
         )
     grey = _grey(file.parent / str(head["image"])).astype(np.float64) / 255.0
     dark = grey if head.get("negate") else 1.0 - grey
@@ -257,7 +257,7 @@ def _number(file: Path, head: dict[str, Any], key: str, fallback: float | None =
     value = head.get(key, fallback)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= FARTHEST:
         raise ValueError(
-            f"{file}: {key} is {value!r:.100}: a number above 0, {FARTHEST:g} at most, is wanted"
+            f"{file}: {key} is {value!r:.100}: expected a number above 0, at most {FARTHEST:g}"
         )
     return float(value)
 
@@ -273,7 +273,7 @@ def _grey(picture: Path) -> NDArray[np.uint8]:
     pixels = len(content) - head.end()
     if largest != 255 or not 0 < width * height <= pixels:
         raise ValueError(
-            f"{picture}: a PGM of 8 bits with {width} x {height} pixels is wanted, and {pixels} bytes are there"
+            f"{picture}: expected an 8-bit PGM of {width} x {height} pixels, found {pixels} bytes"
         )
     return np.frombuffer(content, np.uint8, width * height, head.end()).reshape(height, width)
 

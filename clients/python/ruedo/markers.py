@@ -82,7 +82,7 @@ def map(
 def message(
     layer: str, markers: Iterable[lcmtypes.marker_t], frame: str, utime: int
 ) -> lcmtypes.markers_t:
-    """What Simulation.markers() sends."""
+    """The message that Simulation.markers() sends."""
     if not 1 <= len(arguments.text("layer", layer).encode()) <= 63:
         raise ValueError(f"layer {arguments.shown(layer)}: it must be a name of 1 to 63 bytes")
     result = lcmtypes.markers_t()
@@ -92,7 +92,9 @@ def message(
     result.markers = list(markers)
     for one in result.markers:
         if not isinstance(one, lcmtypes.marker_t):
-            raise TypeError(f"markers are what ruedo.markers makes; {arguments.shown(one)} is none")
+            raise TypeError(
+                f"expected a marker, as ruedo.markers makes it, not {arguments.shown(one)}"
+            )
     result.n = len(result.markers)
     if result.n > 1000:
         raise ValueError(f"a layer has at most 1000 markers, not {result.n}")

@@ -30,7 +30,7 @@ _UNSEEN_SECONDS = 5.0
 
 
 class _Robot(Protocol):
-    """Whose primitives they are; a Robot."""
+    """The robot that executes the primitives."""
 
     name: str
 
@@ -76,9 +76,10 @@ class Motion:
         return self.state in ("done", "ended", "refused")
 
     def wait(self, timeout: float | None = None) -> Motion:
-        """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it
-        ended early or was refused, Timeout when it still runs; the robot goes on then. Warns where
-        sim time stands still for 5 s of real time, and says why. Raises RunEnded."""
+        """Waits for the end of the motion, at most timeout seconds of real time. Raises MotionError
+        when it ended early or was refused, Timeout when it still runs; the robot keeps moving then.
+        Warns where sim time stands still for 5 s of real time, and says why. Raises RunEnded.
+        """
         self._connection.check_callbacks()
         deadline = None if timeout is None else time.monotonic() + timeout
         me = threading.get_ident()
@@ -203,7 +204,9 @@ class Driver:
         self._connection.drivers.keep_repeating(self)
 
     def repeat(self) -> None:
-        """What is held, and the newest primitive where no status has shown it: by real time."""
+        """Repeats the held command, and the newest primitive until a status shows it, by real
+        time.
+        """
         with self._lock:
             newest = self._motions[-1] if self._motions else None
             if self._held:
@@ -212,7 +215,7 @@ class Driver:
                 self._connection.bus.publish(*newest._message)
 
     def repeat_at(self, utime: int) -> None:
-        """What is held, by sim time."""
+        """Repeats the held command, by sim time."""
         if self._held is None or 0 <= utime - self._held_at < 1e6 * self.period():
             return
         with self._lock:

@@ -73,8 +73,8 @@ class Regression:
 
     @property
     def evidence(self) -> str:
-        """On what it has passed: "12000 steps; the client ended with 0 at 59.8 s; ..."; "" where it
-        has not."""
+        """The evidence of a pass: "12000 steps; the client ended with 0 at 59.8 s; ..."; "" where
+        it has not."""
         said = (line for line in reversed(self.output.splitlines()) if line.startswith(_VERDICT))
         return next(said).removeprefix(_VERDICT) if self.passed else ""
 
@@ -136,7 +136,7 @@ def _line(what: str, words: Sequence[_PathLike] | str | None) -> str | None:
 def _goal(goal: tuple[float, float] | None, radius: float | None, by: float | None) -> list[str]:
     if goal is None:
         if radius is not None or by is not None:
-            raise ValueError("radius and by belong to a goal, and there is none")
+            raise ValueError("radius and by need a goal")
         return []
     if radius is None or by is None:
         raise ValueError("a goal needs its radius (m) and by (s)")
@@ -193,7 +193,7 @@ def _reason_first(output: str) -> str:
 def _output_of(
     command: list[str], folder: _PathLike | None, timeout: float, check: bool
 ) -> tuple[str, bool]:
-    """What was printed, and whether the run has passed."""
+    """The output of a run, and whether it passed."""
     __tracebackhide__ = True
     process = subprocess.Popen(
         command,
@@ -225,7 +225,9 @@ def _output_of(
 
 
 def _stopped(process: subprocess.Popen[str]) -> str:
-    """Lets it end its client, too; what it has printed, if nobody else keeps its output open."""
+    """Stops the run, which ends its client. Returns the output, if no other process keeps it
+    open.
+    """
     for end in (process.terminate, process.kill):
         end()
         with suppress(subprocess.TimeoutExpired):
@@ -345,7 +347,7 @@ class _Runs:
         return result
 
     def lost(self) -> str:
-        """What a test that has not failed has not seen."""
+        """Why a test that passed must fail: it missed a run or its failure."""
         if not self.begun:
             return "the test takes ruedo_regression and has not called it: nothing was judged"
         if self._ended < self.begun:

@@ -230,7 +230,7 @@ class Robot:
 
     @property
     def odometry_twist(self) -> Stream[OdometryTwist]:
-        """What the odometry makes of the wheels' speeds, also sideways."""
+        """The velocity that the odometry computes from the wheels' speeds, also sideways."""
         return self._stream("odometry_twist_t", "velocity of odometry")
 
     @property
@@ -302,7 +302,7 @@ class Robot:
 
     @property
     def collisions(self) -> Stream[Collisions]:
-        """What the robot runs into, and what blocks it; it needs no bumper."""
+        """The bodies that the robot touches, and the one that blocks it; no bumper is needed."""
         return self._stream("collisions_t", "collisions")
 
     def on_collision(self, callback: Callable[[Collisions], None]) -> Subscription:
@@ -326,7 +326,7 @@ class Robot:
 
     @property
     def motion(self) -> Stream[MotionStatus]:
-        """What the robot is executing."""
+        """The status of the command that the robot executes."""
         return self._stream("motion_status_t", "motion status")
 
     @property
@@ -368,7 +368,7 @@ class Robot:
         self._driver("wheel_command(left, right)").keep_sending(command.channel, command.data)
 
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
-        """What set_velocity() sends, once, for Simulation.step()."""
+        """A velocity command for Simulation.step(), as set_velocity() sends it, once."""
         data = _VELOCITY.pack(
             _VELOCITY_FINGERPRINT,
             self._connection.clock.utime,
@@ -386,8 +386,8 @@ class Robot:
     def command_joints(
         self, values: Mapping[str, float], mode: JointMode | str = "position"
     ) -> None:
-        """Commands joints by their names: ``{"shoulder": 0.5, "elbow": -0.3}``. Each holds what it
-        was commanded until its next command; no watchdog ends that.
+        """Commands joints by their names: ``{"shoulder": 0.5, "elbow": -0.3}``. Each joint holds
+        its command until the next one, without a watchdog.
 
         mode: "position" (rad or m), "velocity" (rad/s or m/s), "effort" (N m or N), or another of
         JointMode. Positions are kept within the joint's limits. Raises UnknownName, which lists the
@@ -401,7 +401,7 @@ class Robot:
     def joint_command(
         self, values: Mapping[str, float], mode: JointMode | str = "position"
     ) -> Command:
-        """What command_joints() sends, for Simulation.step()."""
+        """A joint command for Simulation.step(), as command_joints() sends it."""
         channel = self._input("joint_command_t", "it has no joints")
         limits = limits_of(self._connection, self.name)
         command = joint_message(self.name, limits, values, mode)
@@ -409,7 +409,7 @@ class Robot:
         return Command(channel, command.encode())
 
     def wheel_command(self, left: float, right: float) -> Command:
-        """What set_wheels() sends, once, for Simulation.step()."""
+        """A wheel command for Simulation.step(), as set_wheels() sends it, once."""
         command = lcmtypes.wheel_command_t()
         command.utime, command.n = self._connection.clock.utime, 2
         command.rate = [finite("left", left), finite("right", right)]
@@ -464,8 +464,8 @@ class Robot:
         return Command(self._input("fault_t"), fault.encode())
 
     def inject(self, kind: str, target: str = "", **how: Any) -> None:
-        """Something goes wrong from now on; what it takes is fault_command()'s. The server's log
-        says what acted; a wrong one is ignored. Raises NotSupported in lockstep.
+        """Injects a fault from now on, with the arguments of fault_command(). The server's log says
+        what acted; a wrong one is ignored. Raises NotSupported in lockstep.
         """
         self._connection.check_open()
         self._check_acts_at_once(f"fault_command({shown(kind)}, ...)")
@@ -484,7 +484,8 @@ class Robot:
         deceleration: float = 0.0,
     ) -> Motion:
         """Drives straight on by a distance (m, negative: back), and comes to rest. Returns at once;
-        wait() on what it returns waits for the end. Limits in m/s and m/s^2, 0: the robot's own."""
+        wait() on the result waits for the end. Limits in m/s and m/s^2, 0: the robot's own.
+        """
         return self._move(
             "advance",
             lcmtypes.move_command_t.ADVANCE,

@@ -1,4 +1,4 @@
-"""What samples compute from their fields, by the kind of sample. The classes themselves are made
+"""Methods of samples, by the kind of sample. The classes themselves are made
 from proto/vocabulary.toml.
 """
 
@@ -32,7 +32,7 @@ class ScanMethods:
         return float(part.min()) if part.size else math.inf
 
     def points(self, device: Placed | None = None, pose: Placed | None = None) -> Floats:
-        """Where the rays ended, of those that returned: (k, 2) m in the device's frame; with the
+        """The end points of the rays that returned: (k, 2) m in the device's frame; with the
         device (``robot.lrf``) (k, 3) in base_link, and with the robot's pose, too, in the world."""
         good = np.isfinite(self.ranges)
         ranges, angles = self.ranges[good], self.angles[good]
@@ -254,7 +254,7 @@ class JointsMethods:
     efforts: Floats
 
     def index(self, name: str) -> int:
-        """Where a joint is in the arrays. Raises UnknownName, which lists the joints."""
+        """A joint's index in the arrays. Raises UnknownName, which lists the joints."""
         if name not in self.names:
             raise UnknownName(
                 f"there is no joint {shown(name)}; there is {', '.join(self.names) or 'none'}"
@@ -262,15 +262,15 @@ class JointsMethods:
         return self.names.index(name)
 
     def position(self, name: str) -> float:
-        """Of a joint, rad or m. Raises UnknownName."""
+        """The position of a joint, rad or m. Raises UnknownName."""
         return float(self.positions[self.index(name)])
 
     def velocity(self, name: str) -> float:
-        """Of a joint, rad/s or m/s. Raises UnknownName."""
+        """The velocity of a joint, rad/s or m/s. Raises UnknownName."""
         return float(self.velocities[self.index(name)])
 
     def effort(self, name: str) -> float:
-        """Of a joint's motor, N m or N. Raises UnknownName."""
+        """The effort of a joint's motor, N m or N. Raises UnknownName."""
         return float(self.efforts[self.index(name)])
 
 

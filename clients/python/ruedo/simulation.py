@@ -82,7 +82,7 @@ class Simulation(Requests):
 
     @property
     def version(self) -> str:
-        """Of the server."""
+        """The version of the server."""
         return self._info.version
 
     @property
@@ -150,9 +150,10 @@ class Simulation(Requests):
         self._connection.sleep(round(arguments.finite("seconds", seconds) * 1e6))
 
     def every(self, period: float) -> Every:
-        """A loop at a period of sim time (s): ``for t in sim.every(0.1)`` goes on at each multiple
-        of it, with the time (s) of that moment, and leaves out those that have passed while the
-        loop's body ran. Ends with the run. ``async for`` takes it, too."""
+        """A loop at a period of sim time (s): ``for t in sim.every(0.1)`` runs its body at each
+        multiple of it, with the time (s) of that moment, and leaves out those that have passed
+        while the loop's body ran. Ends with the run. ``async for`` takes it, too.
+        """
         microseconds = round(arguments.finite("period", period) * 1e6)
         if microseconds < 1:
             raise ValueError(f"period is {period}: it must be a number of seconds above 0")
@@ -186,8 +187,8 @@ class Simulation(Requests):
     def step(
         self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0
     ) -> Observations:
-        """Takes n steps, at most timeout seconds of real time each time that nothing goes on, and
-        returns what was seen.
+        """Takes n steps and returns what was observed in them. timeout: s of real time without
+        progress, after which Timeout is raised.
 
         In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps
         with their commands, and has every message of every step; the first call's observations
@@ -261,7 +262,7 @@ class Simulation(Requests):
         """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or
         URDF sent along as text. It stands on the ground below x, y (m), or at z (m) where that is
         given; heading in rad. The server refuses to put it into something. Returns the model's
-        name: the server numbers one that is taken, unless it was asked for."""
+        name: the server numbers a name that exists, unless the call gave it."""
         body = lcmtypes.spawn_request_t()
         body.name, body.on_ground = arguments.text("name", name), z is None
         body.model, body.text = arguments.text("model", model), arguments.text("text", text)

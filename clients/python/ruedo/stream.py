@@ -40,7 +40,7 @@ _MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps te
 
 
 class Form(NamedTuple):
-    """What a stream makes of its messages."""
+    """How a stream decodes its messages."""
 
     fingerprint: bytes | None  # of the messages that it can be made of; None: of any
     make: Callable[[bytes], Any]
@@ -51,7 +51,7 @@ RAW = Form(None, bytes, "raw")
 
 
 def form_of(message: Any) -> Form:
-    """Of a class that lcm-gen made: its objects, as they are."""
+    """The form of an lcm-gen class: its objects, as they are."""
     try:
         fingerprint = message._get_packed_fingerprint()
     except AttributeError:
@@ -102,7 +102,7 @@ class Reader(Generic[T]):
         return self._stream._sample_for(self, True, timeout)
 
     def __iter__(self) -> Iterator[T]:
-        """What next() returns, again and again: ``for scan in robot.lrf``. Ends with the run."""
+        """Yields next() repeatedly: ``for scan in robot.lrf``. Ends with the run."""
         while True:
             try:
                 sample = self.next(math.inf)
@@ -146,7 +146,7 @@ class _Arrival:
         self._sample: Any = None
 
     def sample(self) -> Any:
-        """Decoded once; by two threads at most twice. Raises TypeMismatch."""
+        """The decoded sample, cached (two threads may decode it twice). Raises TypeMismatch."""
         if self._sample is None:
             self._sample = self._stream._sample_of(self.data)
         return self._sample
@@ -273,7 +273,7 @@ class Stream(Reader[T]):
         return before if utime - times[after - 1] < times[after] - utime else behind
 
     def _poll_for(self, reader: Reader[T]) -> _Arrival | None:
-        """What next() would return, or None: then the caller's thread waits for it. Raises what
+        """The sample of next(), or None: then the caller's thread waits for it. Raises what
         next() does."""
         connection = self._connection
         connection.check_open()
@@ -353,7 +353,7 @@ class Stream(Reader[T]):
             source.close()
 
     def _forget(self) -> None:
-        """What came is of a run that has ended."""
+        """Forgets the samples of a run that has ended."""
         with self._news:
             self._newest = self._fault = self._last_utime = None
             self._kept.clear()
@@ -413,7 +413,7 @@ class Stream(Reader[T]):
                 stream._missed += 1
 
     def _keep(self, arrival: _Arrival) -> None:
-        """For at(), and for readers with a depth. With the lock held."""
+        """Keeps a sample for at(), and for readers with a depth. With the lock held."""
         before = self._kept[-1].utime if self._kept else None
         if before is not None and (arrival.utime or 0) < before:  # sim time was reset
             self._kept.clear()
@@ -530,7 +530,7 @@ class Streams:
             stream._unsubscribe()
 
     def forget(self) -> None:
-        """What came is of a run that has ended."""
+        """Forgets the samples of a run that has ended."""
         with self._lock:
             streams = list(self._all.values())
         for stream in streams:

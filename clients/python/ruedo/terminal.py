@@ -1,4 +1,4 @@
-"""What the commands of this package print; names and reasons may be a stranger's."""
+"""Output of this package's commands; names and reasons may come from elsewhere."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def say(text: str) -> None:
 
 
 def flush() -> None:
-    """What was said, at the end. Raises OSError likewise."""
+    """Flushes the output at the end. Raises OSError likewise."""
     with _named():
         sys.stdout.flush()
 

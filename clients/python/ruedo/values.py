@@ -1,4 +1,4 @@
-"""What samples are built on: values that compare by what they hold, and the arrays and texts in
+"""The base of samples: values that compare by content, and the arrays and texts in
 them.
 """
 
@@ -87,14 +87,14 @@ class Word(str, Enum):
 
 
 def word(words: Mapping[int, str], value: int) -> str:
-    """The text of a number in a message; one of a later server is shown as it is."""
+    """The name of a number in a message; an unknown number, of a later server, as digits."""
     if value in words:
         return words[value]
     return f"0x{value:08x}" if value > 127 else str(value)
 
 
 def fixed(values: NDArray[Any]) -> NDArray[Any]:
-    """Which nobody can write into."""
+    """A read-only array."""
     values.setflags(write=False)
     return values
 

@@ -72,7 +72,7 @@ def _refuse_control_characters(part: Any) -> None:
 
 
 def run_id_of(message: bytes) -> int | None:
-    """Of a world_info_t; None where it is none that this client reads."""
+    """The run id of a world_info_t; None if this client cannot read it."""
     if len(message) < _HEAD.size or message[:8] != lcmtypes.world_info_t._get_packed_fingerprint():
         return None
     run_id: int = _HEAD.unpack_from(message)[2]
@@ -131,7 +131,7 @@ class WorldInfoAssembler:
         return info
 
     def _check_size(self, nparts: int) -> None:
-        """What is not whole yet waits in memory."""
+        """Drops an incomplete info that needs too much memory. Raises TypeMismatch."""
         size = sum(map(len, self._parts.values()))
         if nparts <= _MOST_PARTS and size <= _MOST_BYTES:
             return

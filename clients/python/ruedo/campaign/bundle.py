@@ -17,7 +17,7 @@ Bundle = dict[str, bytes]
 
 
 def pack(folder: Path, files: Iterable[str]) -> Bundle:
-    """Those of the files that lie in the folder, by their path in it; others have to be
+    """The files that lie in the folder, by their path in it; others have to be
     everywhere.
     """
     inside = sorted({os.path.relpath(file, folder) for file in files if _is_inside(file, folder)})

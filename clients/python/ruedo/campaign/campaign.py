@@ -85,9 +85,7 @@ class Campaign:
 
     @property
     def cases(self) -> list[Case]:
-        """All cases, in the order of the file. Worlds are made and read when this is first asked
-        for.
-        """
+        """All cases, in the order of the file. Worlds are made and read on first use."""
         if self._cases is None:
             self.folders.leave_out(self._outputs())
             planner = Planner(
@@ -153,7 +151,7 @@ class Campaign:
             return Results(cases, store.rows(case.id for case in cases), self.out)
 
     def results(self, shard: str | None = None) -> Results:
-        """What there is."""
+        """The results so far."""
         cases = shard_of(self.cases, shard) if shard else self.cases
         anything = (self.out / "results.sqlite").is_file()
         with Store(self.out, write=not anything) as store:
@@ -185,7 +183,7 @@ class Campaign:
         store.set_about("files", json.dumps(self._by_name()))
 
     def _inputs(self) -> dict[str, str]:
-        """Those that nothing writes while its cases run, with their hashes."""
+        """The input files, which nothing may write while the cases run, with their hashes."""
         return {
             file: sha256
             for file, sha256 in self._files.items()
@@ -293,8 +291,8 @@ def _on_this_machine(cases: list[Case], folder: str, workers: int) -> Iterator[D
 
 
 class Unchanged:
-    """Whether files are what they were when the cases were made of them. What is in them is looked
-    at where somebody has touched them.
+    """Whether the files are unchanged since the cases were made. Reads the content only of files
+    whose time or size has changed.
     """
 
     def __init__(self, files: dict[str, str]) -> None:

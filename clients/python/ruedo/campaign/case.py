@@ -40,7 +40,7 @@ _IDLE = (
 
 
 class TimeIsUp(BaseException):
-    """Of the wall-clock limit, inside a controller: no `except Exception` of its own stops it."""
+    """Raised inside a controller at the wall-clock limit; `except Exception` does not catch it."""
 
 
 class BrokenRun(BaseException):
@@ -375,7 +375,7 @@ def fault_text(fault: dict[str, Any]) -> str:
 
 
 def thinned(log: str) -> tuple[bytes, str]:
-    """What acted on the run and the hashes of its state, as a log; and the last of the hashes."""
+    """A log of the run's inputs and state hashes, and the last of the hashes."""
     from ..lcmtypes import state_hash_t
 
     kept = log + ".thin"
@@ -412,8 +412,8 @@ def goals(what: dict[str, Any]) -> list[str]:
 
 
 def _scratch(everything: bool, what: dict[str, Any]) -> str | None:
-    """Where a case's files are while it runs: in memory when they are a few kB, since a closed log
-    waits for its disk.
+    """The folder of a case's files while it runs: in memory when they are a few kB, since a closed
+    log waits for its disk.
     """
     small = not everything and "python" in what["controller"]
     return "/dev/shm" if small and os.access("/dev/shm", os.W_OK | os.X_OK) else None
@@ -424,7 +424,7 @@ def _scratch_name(process: int) -> str:
 
 
 def remove_scratch(process: int) -> None:
-    """What a process that was killed could not remove."""
+    """Removes the scratch files that a killed process left."""
     for place in {"/dev/shm", tempfile.gettempdir()}:
         for folder in Path(place).glob(_scratch_name(process) + "*"):
             shutil.rmtree(folder, ignore_errors=True)
@@ -437,7 +437,7 @@ def _no_commands(robots: int) -> Any:
 
 
 def named(error: BaseException) -> str:
-    """Its kind and what it says, if it can say anything."""
+    """The exception's type, and its text if it has one."""
     try:
         return f"{type(error).__name__}: {error}"
     except Exception:

@@ -266,7 +266,9 @@ def _name_unknown_programs(campaign: Any) -> None:
 
 
 def _name_changes(campaign: Any) -> None:
-    """Or a picture that somebody put there is why 600 cases run again, and nobody knows."""
+    """Prints changed input files, since even a picture put into the folder makes all cases run
+    again.
+    """
     changed = campaign.changes()
     if changed:
         more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
@@ -277,7 +279,7 @@ def _name_changes(campaign: Any) -> None:
 
 
 def _results(campaign: Any) -> Any:
-    """Those that there are."""
+    """The results so far."""
     results = campaign.results()
     if len(results.done) < len(results.cases):
         _name_changes(campaign)
@@ -405,7 +407,7 @@ def _slurm(arguments: argparse.Namespace) -> int:
 #SBATCH --time={arguments.time}
 #SBATCH --output={out}.%a.out
 # Each task has a folder of its own. After the last: ruedo campaign join {file}
-# {shlex.quote(out)}.shard* A task that was cut off goes on where it was when this script is
+# {shlex.quote(out)}.shard* A task that was cut off continues when this script is
 # submitted again.
 ruedo campaign run {file} --quiet --workers "$SLURM_CPUS_PER_TASK" \\
   --shard "$SLURM_ARRAY_TASK_ID/{count}" --out {shlex.quote(out)}.shard"$SLURM_ARRAY_TASK_ID"

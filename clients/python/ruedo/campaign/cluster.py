@@ -126,7 +126,7 @@ class _Head:
 
 
 def _knock(address: str) -> None:
-    """Ray itself takes minutes to say that nobody is there."""
+    """Raises at once if nothing listens at the address; Ray itself takes minutes."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdigit():
         return  # "auto", "local", a name that Ray knows

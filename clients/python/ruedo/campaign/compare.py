@@ -19,7 +19,7 @@ Pair = tuple[
 
 @dataclass
 class Comparison:
-    """What became of the cases that both have."""
+    """The differences between the cases that both campaigns have."""
 
     before: str
     now: str
@@ -40,7 +40,7 @@ class Comparison:
 
     @property
     def change(self) -> tuple[float, float, float]:
-        """Of the success rate, with its 95 % interval."""
+        """The change of the success rate, with its 95 % interval."""
         return paired_difference(self.both, len(self.worse), len(self.better), self.neither)
 
     def as_dict(self) -> dict[str, Any]:

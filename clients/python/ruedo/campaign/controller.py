@@ -17,13 +17,13 @@ DONE = "done"
 
 
 class NothingYet(LookupError):
-    """A device that is asked for has published nothing so far. The robot stands meanwhile, as one
-    does whose program waits for its first message.
+    """A controller read a device that has published nothing so far. The robot stands meanwhile, as
+    one does whose program waits for its first message.
     """
 
 
 class View:
-    """What a controller in the engine sees of its robot at a decision.
+    """The robot as its controller in the engine sees it at a decision.
 
     view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(); NothingYet
     where none has come, which a controller may leave to its caller. "lrf.ranges" in view tells
@@ -68,7 +68,7 @@ class View:
 
 
 def _rows(engine: Engine, robot: str) -> dict[str, int]:
-    """Of each device or kind: which row of its arrays is the robot's."""
+    """The robot's row in the arrays of each device or kind."""
     seen: dict[str, int] = {}
     rows: dict[str, int] = {}
     for owner, device, kind in engine.devices:

@@ -1,4 +1,4 @@
-"""What goes wrong with a campaign, each with the exit code of the command line."""
+"""The errors of campaigns, each with the exit code of the command line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class NothingCompared(CampaignError):
 
 
 class UsageError(CampaignError, ValueError):
-    """What was asked for cannot be, whatever is in the files."""
+    """The command line is wrong, whatever the files hold."""
 
     exit_code = 2
 

@@ -35,7 +35,7 @@ class Function:
         is_file = module.endswith(".py")
         self.file = folder / module if is_file else _file_of(module, folder)
         if not os.path.isfile(self.file):
-            raise ValueError(f"is {name!r}, and there is no file {self.file}")
+            raise ValueError(f"is {name!r}, but there is no file {self.file}")
         self._imports_from = [str(self.file.parent), *([] if is_file else [str(folder)])]
         self._attribute = attribute
         try:

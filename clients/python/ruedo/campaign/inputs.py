@@ -134,7 +134,7 @@ def _is_written(file: str) -> bool:
 
 
 def _is_campaign(file: str) -> bool:
-    """What it asks for is in the ids of its own cases, and nothing to another one's."""
+    """A campaign's file is part of the ids of its own cases, not of another campaign's."""
     import yaml
 
     try:

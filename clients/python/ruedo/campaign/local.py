@@ -64,7 +64,7 @@ class Worker:
             pass  # it was killed while idle: its pipe is at its end
 
     def left_s(self) -> float:
-        """Until it must have begun, or answered."""
+        """Seconds left for the process to begin the case, or to answer."""
         return max(0.0, self._until - time.monotonic())
 
     def take(self) -> tuple[dict[str, Any], float] | Literal["begun"] | None:
@@ -92,7 +92,7 @@ class Worker:
             os.kill(self._process.pid, signal.SIGTERM)
 
     def end(self) -> int:
-        """Its exit code. It ends what it has started; where it hangs, it is killed."""
+        """Ends the process with its children, and returns its exit code; kills it if it hangs."""
         self.tell_to_end()
         if self._process.returncode is None:
             if not ends_within(self._process.pid, _PARTING):
@@ -142,7 +142,7 @@ class Crew:
             yield from self._collect(waiting)
 
     def run_one(self, what: dict[str, Any], full_log: str = "") -> Outcome:
-        """Of what need not be a campaign's case, such as one with other faults."""
+        """Runs a case that need not be the campaign's, such as one with other faults."""
         case = Case(0, "one", "", "", "", what["seed"], {}, what)
         ((_, outcome, _),) = self.run([case], full_log)
         return Outcome(**outcome)

@@ -1,4 +1,4 @@
-"""What came of a case: a verdict and what else went wrong, in one status."""
+"""The outcome of a case: verdict and other faults, in one status."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _MOST_REASON = 500  # characters
 
 @dataclass
 class Outcome:
-    """What came of a case.
+    """The outcome of a case.
 
-    status: passed, failed (an expectation), not judged (what was asked for could not be), crashed,
-    timeout or memory (the controller), or invalid (the case cannot be run). what: which
+    status: passed, failed (an expectation), not judged (an expectation could not be judged),
+    crashed, timeout or memory (the controller), or invalid (the case cannot be run). what: which
     expectation, or what went wrong. reason: in a line; of what has passed, the evidence. log: its
     content.
     """

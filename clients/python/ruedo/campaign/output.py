@@ -1,4 +1,4 @@
-"""What a case prints: a file that does not fill the disk, of which the end is kept."""
+"""A case's output: a file of bounded size, which keeps the end."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_longlong, ctypes.c_l
 
 
 class Output:
-    """Of a case. What lies before the end of a large file is freed where it stands, so that nothing
-    is lost of what is printed meanwhile. A file system that cannot do that, as FAT, lets the file
-    begin anew.
+    """The output of a case. What lies before the end of a large file is freed where it stands, so
+    that nothing is lost of what is printed meanwhile. A file system that cannot do that, as FAT,
+    lets the file begin anew.
     """
 
     def __init__(self, path: str) -> None:
@@ -68,7 +68,7 @@ class Output:
 
 @contextmanager
 def captured(output: Output) -> Iterator[None]:
-    """What is printed, by Python or by a library, goes there, whatever is done to the streams."""
+    """Redirects all output there, of Python and of libraries."""
     streams = sys.stdout, sys.stderr
     _flush(*streams)
     kept = os.dup(1), os.dup(2)

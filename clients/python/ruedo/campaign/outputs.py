@@ -1,4 +1,4 @@
-"""What commands write: never over what they read, and whole or not at all."""
+"""Files that commands write: never over their input, and whole or not at all."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def check_output(option: str, file: str, read: Iterable[str | os.PathLike[str]])
 
 
 def check_writable(path: Path) -> None:
-    """Raises OSError where neither the file nor, while there is none, its folder is writable."""
+    """Raises OSError if the file, or for a new file its folder, is not writable."""
     place = path if path.exists() else path.parent
     if not os.access(place, os.W_OK):
         read_only = os.statvfs(place).f_flag & os.ST_RDONLY
@@ -45,9 +45,9 @@ def check_writable(path: Path) -> None:
 
 @contextmanager
 def replacing(file: str | os.PathLike[str]) -> Iterator[Path]:
-    """Where to write what takes the file's name at the end: when that fails, what was there before
-    stays. Devices, FIFOs and open descriptors (/dev/stdout) are written to as they are. Raises
-    OSError that names the file.
+    """A temporary file that takes the file's name at the end: when that fails, what was there
+    before stays. Devices, FIFOs and open descriptors (/dev/stdout) are written to as they are.
+    Raises OSError that names the file.
     """
     path = Path(file)
     descriptor = _descriptor_of(path)

@@ -34,7 +34,7 @@ def make_pages(
 
 
 def _make_page(campaign: Any, case: Case, row: dict[str, Any], page: Path) -> str:
-    """ "" or why there is none."""
+    """Writes the page of a failed run. Returns "", or why it could not."""
     with tempfile.TemporaryDirectory(prefix="ruedo-page-") as scratch:
         log = Path(scratch) / "run.lcm"
         with Crew(str(campaign.folder)) as crew:

@@ -67,7 +67,7 @@ class Case:
 
     @property
     def place(self) -> str:
-        """What it is compared by with another campaign's: all but the controller."""
+        """The key by which compare matches cases: all but the controller."""
         return json.dumps([self.world, self.robot, self.seed, self.parameters], sort_keys=True)
 
 
@@ -166,7 +166,7 @@ def _round(value: float) -> float:
 
 
 def check_values(content: dict[str, Any], source: Source) -> None:
-    """What a schema cannot say. Raises SpecError."""
+    """Checks what a schema cannot. Raises SpecError."""
     for path, value in _leaves(content, ()):
         if isinstance(value, float) and not math.isfinite(value):
             raise source.error(path, f"is {value}; allowed is a finite number")
@@ -185,7 +185,7 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                 raise source.error((member, i), f"needs either {ways[0]} or {ways[1]}")
             if one.get("name") in names:
                 raise source.error(
-                    (member, i, "name"), f"is {one['name']!r}, which another one is called"
+                    (member, i, "name"), f"is {one['name']!r}, which another entry has already"
                 )
             names |= {one["name"]} if "name" in one else set()
     seeds = content.get("seeds", 1)
@@ -403,7 +403,7 @@ class Planner:
 
     @property
     def named_files(self) -> set[str]:
-        """Those that the campaign names, and its worlds."""
+        """The files that the campaign names, with its worlds."""
         return self.files.keys() - self._beside_files.keys()
 
     def _case(
@@ -604,7 +604,7 @@ def is_expected(what: dict[str, Any]) -> bool:
 
 
 def words_of(command: str) -> set[str]:
-    """Of a shell's line, as it stands there and with its quotes read."""
+    """The words of a shell's line, as written and with quotes removed."""
     words = set(re.split(r"[\s'\"=]+", command))
     reader = shlex.shlex(command, posix=True, punctuation_chars=True)
     reader.whitespace_split, reader.commenters = True, ""
@@ -628,7 +628,7 @@ def files_called(
     except (ValueError, NotImplementedError, IndexError, OSError):  # "", "/etc/*", ".", "aaa..."
         found = []
     if not found:
-        raise source.error(path, f"is {pattern!r}, and no file is called so in {folder}")
+        raise source.error(path, f"is {pattern!r}, which matches no file in {folder}")
     return found
 
 
@@ -638,7 +638,7 @@ def canonical(value: Any) -> bytes:
 
 
 def _acting(what: dict[str, Any]) -> dict[str, Any]:
-    """What acts, without the names of folders: the same on every machine."""
+    """The inputs without folder names: the same on every machine."""
     world = {key: what["world"][key] for key in ("robot", "sha256")}
     expect = {key: value for key, value in what["expect"].items() if key != "golden"}
     return {**what, "world": world, "expect": expect}

@@ -20,7 +20,7 @@ def die_with_parent() -> None:
 
 
 def adopt_orphans() -> None:
-    """What a child of this process leaves behind becomes its own child, so that it can be ended."""
+    """Makes this process the parent of orphaned grandchildren, so that it can end them."""
     _libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
@@ -78,7 +78,7 @@ def _children(pid: int | str = "self") -> list[int]:
 
 
 def private_mb() -> int:
-    """What this process has of data that is its own, MB: what RLIMIT_DATA counts."""
+    """The private data of this process, MB, as RLIMIT_DATA counts it."""
     with open("/proc/self/status") as stream:
         for line in stream:
             if line.startswith("VmData:"):

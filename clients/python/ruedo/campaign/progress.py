@@ -12,7 +12,7 @@ from .plan import shard_of
 
 @contextmanager
 def shown(campaign: Any, shard: str | None, quiet: bool) -> Iterator[Callable[..., None] | None]:
-    """Yields what is to be called with each outcome; None where nobody looks."""
+    """Yields a function to call with each outcome; None without a terminal."""
     if quiet or not sys.stderr.isatty():
         yield None
         return

@@ -59,9 +59,9 @@ code { background: #f2f4f8; padding: .1em .3em; user-select: all } svg { max-wid
 
 
 def write_report(campaign: Any, file: Path, baseline: str | None = None, pages: int = 0) -> None:
-    """Of what there is so far. baseline: as of compare_with(). pages: of so many failed runs, the
-    worst, a page of the console is put into the folder beside `file` that is called as it is, with
-    .pages at its end.
+    """The page of the results so far. baseline: as of compare_with(). pages: of so many failed
+    runs, the worst, a page of the console is put into the folder beside `file` that is called as it
+    is, with .pages at its end.
     """
     results: Results = campaign.results()
     worst = _worst_of(results)
@@ -144,7 +144,7 @@ def _binned(name: str, values: list[Any]) -> Any:
 
 
 class _Bin(tuple):  # type: ignore[type-arg]
-    """From and to, of a parameter's values."""
+    """An interval of a parameter's values: from, to."""
 
     def __new__(cls, low: float, high: float) -> _Bin:
         return super().__new__(cls, (low, high))
@@ -212,8 +212,8 @@ def _reasons(results: Results) -> Iterable[str]:
 
 
 def _all_cases(results: Results) -> Iterable[str]:
-    """Of what has passed, with the evidence."""
-    yield "<h2>All cases</h2><details><summary>what came of each</summary><table>"
+    """A table of all cases with status and reason."""
+    yield "<h2>All cases</h2><details><summary>the result of each</summary><table>"
     yield "<tr><th></th><th>world</th><th>controller</th><th>seed</th><th></th><th></th></tr>"
     for case, row in results.done[:_MOST_ROWS]:
         yield (
@@ -372,7 +372,7 @@ def _extent(results: Results, world: str) -> tuple[float, float, float, float]:
 
 
 def place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
-    """Where the robot was when the first expectation did not hold; at the end, if that has no
+    """The robot's place when the first expectation failed; at the end, if that has no
     time.
     """
     if not row["track"]:

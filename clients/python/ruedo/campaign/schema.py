@@ -1,4 +1,4 @@
-"""What a campaign's file may hold, as a JSON schema, and how a wrong one is told: file, line,
+"""The JSON schema of a campaign's file, and errors for a wrong one: file, line,
 allowed.
 """
 
@@ -191,7 +191,7 @@ SCHEMA: dict[str, Any] = _object(
 
 
 class Source:
-    """Where the members of a campaign stand: lines of a file, or nothing for one made in Python."""
+    """The lines of a campaign's members in its file; none for one made in Python."""
 
     def __init__(self, name: str, lines: dict[tuple[Any, ...], int] | None = None) -> None:
         self.name = name

@@ -141,7 +141,7 @@ class Store:
         )
 
     def rows(self, ids: Iterable[str]) -> dict[str, dict[str, Any]]:
-        """Of those cases, those that have a result."""
+        """The results of the given cases that have one."""
         wanted = set(ids)
         found = {}
         for row in self._select(_ALL):
@@ -150,7 +150,7 @@ class Store:
         return found
 
     def each(self) -> Iterator[tuple[Any, ...]]:
-        """All results as they stand there, each found good; the id comes first."""
+        """All results as stored, each checked; the id comes first."""
         for row in self._select(_ALL):
             self._checked(row)
             yield row
@@ -179,7 +179,7 @@ class Store:
         except (TypeError, ValueError, OverflowError, RecursionError):
             good = False
         if not good:
-            raise self._damaged(f"the result {row[0]!r:.40} is none")
+            raise self._damaged(f"the result {row[0]!r:.40} is not valid")
         return one
 
     def take(self, other: Store) -> int:
@@ -201,7 +201,7 @@ class Store:
         return taken
 
     def log(self, id: str) -> Path:
-        """Where the log of a case is, if it was kept."""
+        """The path of a case's log, if it was kept."""
         return _log_of(self.folder, id)
 
     def _keep_log(self, id: str, content: bytes) -> None:
@@ -305,7 +305,7 @@ class Results:
         self.frame().to_parquet(file, index=False)
 
     def junit(self, name: str) -> str:
-        """For CI: a test case for each."""
+        """JUnit XML for CI, with a test case for each case."""
         from xml.etree import ElementTree
 
         suite = ElementTree.Element(
@@ -342,8 +342,8 @@ def _log_of(folder: Path, id: str) -> Path:
 
 
 def _copy_of(file: Path) -> tempfile.TemporaryDirectory[str]:
-    """For reading where nothing can be written: SQLite makes files beside what it reads. Raises
-    OSError.
+    """A copy for reading in a folder without write access, since SQLite writes files beside the
+    database. Raises OSError.
     """
     folder = tempfile.TemporaryDirectory(prefix="ruedo-results-")
     for one in (file, file.with_name(file.name + "-wal")):
@@ -359,7 +359,7 @@ def _fits(value: float) -> bool:
 
 
 def _printable(text: str) -> str:
-    """What XML may hold."""
+    """The text without characters that XML forbids."""
     return "".join(
         c
         for c in text

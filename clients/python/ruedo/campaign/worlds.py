@@ -68,7 +68,7 @@ class WorldFiles:
         return self._made[key]
 
     def sha256(self, world: str, spawn: str) -> str:
-        """Of the world's file and all files that it and the spawned model are read from.
+        """The hash of the world's file and of all files that it and the spawned model read.
 
         Worlds that refer to the same files are read once: what is not in the text does not change.
         """

@@ -1,4 +1,4 @@
-"""What goes wrong with a fit, with the exit code of the command line."""
+"""The errors of a fit, with the exit code of the command line."""
 
 from __future__ import annotations
 

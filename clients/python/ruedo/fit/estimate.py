@@ -32,6 +32,6 @@ def normal(name: str, value: float, std: float, unit: str = "", why: str = "") -
 
 
 def log_normal(name: str, value: float, relative: float, unit: str = "", why: str = "") -> Estimate:
-    """Of a value that is above 0, with the standard deviation of its logarithm."""
+    """An estimate of a positive value, from the standard deviation of its logarithm."""
     factor = math.exp(min(Z95 * relative, 50))
     return Estimate(name, value, value / factor, value * factor, unit, why)

@@ -84,7 +84,7 @@ class Fit:
     beams: BeamModel | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For --json: {part: [{name, value, low, high, unit, why}]}."""
+        """The result for --json: {part: [{name, value, low, high, unit, why}]}."""
         return {
             "logs": [str(one.file) for one in self.recordings],
             "remarks": self.remarks,

@@ -152,7 +152,9 @@ def _cells(
 
 
 class _Counts:
-    """Of each cell: scans that end in it and that pass it, and when the first and last ended."""
+    """For each cell: the scans that end in it and that pass it, and when the first and last
+    ended.
+    """
 
     def __init__(self, size: int):
         self.hits = np.zeros(size, np.uint16)

@@ -48,7 +48,9 @@ def _least(values: Array) -> float:
 
 
 def fit_walk(groups: list[tuple[Array, Array]]) -> Walk:
-    """Of residuals (N,) with clocks (C, N), several independent series with the same variances."""
+    """Fits residuals (N,) with clocks (C, N): several independent series with the same
+    variances.
+    """
     size = groups[0][1].shape[0]
     total = sum(float(np.sum(values**2)) for values, _ in groups)
     driven = sum(clocks.sum(axis=1) for _, clocks in groups)
@@ -78,7 +80,9 @@ def fit_walk(groups: list[tuple[Array, Array]]) -> Walk:
 
 
 def _relative_std(cost: Callable[[Array], float], logs: Array) -> Array:
-    """Of each variance, by the curvature of the likelihood; infinite where it has none."""
+    """The relative standard deviation of each variance, by the curvature of the likelihood; inf
+    without one.
+    """
     size, step = len(logs), 0.05
     hessian = np.zeros((size, size))
     unit = np.eye(size) * step

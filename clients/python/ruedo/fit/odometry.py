@@ -135,7 +135,7 @@ def base_motion(moved: Array, place: Array) -> Array:
 def fit_odometry(
     recordings: Sequence[Recording], geometry: Geometry, plain: bool = False
 ) -> OdometryFit:
-    """Of drives of one robot. plain: least squares, all errors alike, as a baseline.
+    """Fits the drives of one robot. plain: least squares, all errors alike, as a baseline.
 
     Raises FitError for a log without a path, without wheels, or in which little is driven.
     """

@@ -170,7 +170,7 @@ def fit_beams(found: Residuals) -> tuple[BeamModel, Array]:
 
 
 def _curvature(cost: object, values: Array) -> Array:
-    """Standard deviations by the curvature of the likelihood; infinite where there is none."""
+    """Standard deviations by the curvature of the likelihood; infinite without curvature."""
     assert callable(cost)
     step = np.array([1e-4, 0.02, 0.02, 0.05])
     answer = np.full(len(values), np.inf)

@@ -97,7 +97,7 @@ class Geometry:
 
 @dataclass(eq=False)
 class Recording:
-    """What a log holds; None for what it lacks."""
+    """The contents of a log; None for each stream that it lacks."""
 
     file: File
     kind: str  # of the file, for people: "CARMEN log"

@@ -56,7 +56,7 @@ def _row(one: Any) -> str:
 
 
 def plot_to_svg(draw: Any, width: float = 7.0, height: float = 5.0) -> str:
-    """What draw(axes) draws, as SVG; the same bytes each time."""
+    """The SVG of the plot that draw(axes) makes; the same bytes each time."""
     try:
         import matplotlib
         from matplotlib.figure import Figure
@@ -92,7 +92,7 @@ def _drive_plots(answer: Fit, fitted: OdometryFit) -> list[str]:
 
 
 def distribution(values: np.ndarray, most: int = 400) -> tuple[np.ndarray, np.ndarray]:
-    """Of an empirical distribution function, at most so many points."""
+    """The points of an empirical distribution function, at most so many."""
     ordered = np.sort(values)
     at = np.unique(np.linspace(0, len(ordered) - 1, min(most, len(ordered))).astype(int))
     return ordered[at], (at + 0.5) / len(ordered)

@@ -47,7 +47,9 @@ def fit_timing(recordings: Sequence[Recording]) -> list[Estimate]:
 
 
 def allan_variance(values: Array, sizes: Array) -> Array:
-    """Of averages over so many samples (M,), overlapping (IEEE Std 952, annex C)."""
+    """The Allan variance of averages over so many samples (M,), overlapping (IEEE Std 952, annex
+    C).
+    """
     total = np.concatenate([[0.0], np.cumsum(values)])
     answer = np.empty(len(sizes))
     for k, n in enumerate(sizes):

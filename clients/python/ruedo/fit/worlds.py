@@ -17,7 +17,7 @@ from .recording import Recording
 
 @dataclass(frozen=True)
 class MadeWorld:
-    """What make_world() wrote."""
+    """The files that make_world() wrote."""
 
     summary: str
     moving: list[Moving]

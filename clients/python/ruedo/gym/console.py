@@ -32,7 +32,7 @@ class Console:
         options: dict[str, Any],
         robots: tuple[str, ...],
     ) -> None:
-        """file: the world's, instead of the text; None: there is none."""
+        """file: the world's file, instead of the text, or None."""
         first = self._simulation is None
         self.close()
         if options["randomize"]:

@@ -1,4 +1,4 @@
-"""What the shipped tasks have in common: a robot that drives, the sensors that are observed, a
+"""The base of the shipped tasks: a robot that drives, observed sensors, a
 goal, and options for all of these.
 """
 
@@ -149,7 +149,7 @@ class DriveTask(Task):
         return given
 
     def _choose_sensors(self) -> None:
-        """And disables those that nobody observes."""
+        """Selects the observed sensors, and disables the others."""
         if wrong := [one for one in self.sensors if one not in SENSORS]:
             raise ValueError(f"sensors has {shown(wrong[0])}; there are {', '.join(SENSORS)}")
         kinds = ["camera" if one == "depth" else one for one in self.sensors]
@@ -268,7 +268,7 @@ class GoalTask(DriveTask):
         return self.rewarded(before - self._distance, success, self.failed() & ~success)
 
     def failed(self) -> NDArray[np.bool_]:
-        """Who touches something."""
+        """The environments whose robot touches something."""
         touched: NDArray[np.bool_] = self._touching > 0
         return touched
 
@@ -285,7 +285,7 @@ class GoalTask(DriveTask):
 
 @dataclass(frozen=True)
 class _Sensor:
-    """What is observed of a sensor: its term, the settings that it needs, and how the term follows
+    """An observed sensor: its term, the settings that it needs, and how the term follows
     from its fields.
     """
 

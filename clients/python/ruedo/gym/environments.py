@@ -53,7 +53,9 @@ class _SavedEpisode:
 
 
 class SavedEpisodes(Saved):
-    """What `TaskVectorEnv.save` gave; it does not change. ``len()``: how many episodes."""
+    """A state that `TaskVectorEnv.save` returned; it does not change. ``len()``: how many
+    episodes.
+    """
 
     def __init__(self, episodes: list[_SavedEpisode]) -> None:
         self._episodes = episodes
@@ -66,8 +68,10 @@ class SavedEpisodes(Saved):
 
 
 # Of `TaskVectorEnv`, for suggestions.
-_OPTIONS = ("num_envs", "split", "noise", "threads", "randomize", "settings", "disable")
-_OPTIONS += ("max_episode_steps", "autoreset_mode", "render_mode")
+_OPTIONS = (
+    *("num_envs", "split", "noise", "threads", "randomize", "settings", "disable"),
+    *("max_episode_steps", "autoreset_mode", "render_mode"),
+)
 
 
 class MadeAnew:
@@ -139,7 +143,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         if "set" in options:
             warnings.warn("set is deprecated: it is settings", DeprecationWarning, stacklevel=2)
             settings = options.pop("set")
-        inits = [one.__init__ for one in task.__mro__[:-1] if "__init__" in vars(one)]
+        inits = [vars(one)["__init__"] for one in task.__mro__[:-1] if "__init__" in vars(one)]
         check_known(task.__name__, options, inits, _OPTIONS)
         self.task = task(**options)
         limit = self.task.max_episode_steps if max_episode_steps is None else max_episode_steps
@@ -198,9 +202,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             **self._options,
         )
         if self.render_mode == "human" and not self._engine.robots:
-            raise ValueError(
-                "render_mode 'human' repeats what robots with a drive do; there is none"
-            )
+            raise ValueError("render_mode 'human' needs a robot with a drive; the scene has none")
         seconds = self.task.action_seconds
         self._steps = round(seconds / self._engine.step_size)
         if self._steps < 1 or abs(self._steps * self._engine.step_size - seconds) > 1e-9:
@@ -224,7 +226,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._is_set_up = True
 
     def _world_file(self) -> str | None:
-        """Of a task whose world is a file, or has a name."""
+        """The world's file of a task whose world is a file or a name."""
         world = self.task.world
         if world is None or isinstance(world, World):
             return None
@@ -255,8 +257,8 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     ) -> tuple[NDArray[Any], Info]:
         """Begins new episodes in all environments, or where ``options["reset_mask"]`` says.
 
-        seed: environment i draws its scenes from ``seed + i``; or one for each; None goes on with
-        the draws that there are.
+        seed: environment i draws its scenes from ``seed + i``; or one for each; None continues the
+        current draws.
         """
         self._refuse_sent("reset()")
         seeds = self._seeds(seed)
@@ -480,7 +482,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         return list(self._scenes)
 
     def _rows(self) -> dict[str, NDArray[Any]]:
-        """What this class and the task keep of the episodes; the engine's arrays are its own."""
+        """The per-episode arrays of this class and of the task; the engine's are its own."""
         return {
             f"{type(keeper).__name__}.{name}": value
             for keeper in (self, self.task)
@@ -557,7 +559,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             self._show(texts[0], seeds[0])
 
     def _tell_drawn(self, indices: NDArray[np.intp], info: Info) -> None:
-        """What randomize drew for the episodes that begin; NaN in the rows of the others."""
+        """The values that randomize drew for the episodes that begin; NaN in the other rows."""
         if not self._options["randomize"]:
             return
         info["_drawn"] = np.zeros(self.num_envs, bool)
@@ -592,7 +594,7 @@ def _aligned_copy(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
 
 
 def row_of(values: Any, i: int) -> Any:
-    """Of one environment, of arrays with a row for each."""
+    """One environment's row of arrays with a row for each."""
     if isinstance(values, dict):
         return {name: row_of(value, i) for name, value in values.items()}
     return values[i]
@@ -647,7 +649,7 @@ class TaskEnv(MadeAnew, gymnasium.Env):
         return self._one.save()
 
     def restore(self, saved: SavedEpisodes) -> tuple[Any, Info]:
-        """Makes the episode what it was. Returns the observation."""
+        """Restores the episode. Returns the observation."""
         observations, _ = self._one.restore(saved, 0)
         return row_of(observations, 0), {}
 
@@ -682,6 +684,6 @@ def checked_mode(mode: Any) -> AutoresetMode:
 
 
 def check_options(options: Any) -> None:
-    """Of a reset. Raises TypeError."""
+    """Checks the options of a reset. Raises TypeError."""
     if not isinstance(options, (dict, type(None))):
         raise TypeError(f"options is a dict, not {shown(options)}")

@@ -41,7 +41,7 @@ Each = dict[str, Any]
 
 
 class SavedFleet(Saved):
-    """What `FleetEnv.save` gave; it does not change."""
+    """A state that `FleetEnv.save` returned; it does not change."""
 
     def __init__(self, world: SavedWorld, episode: Each) -> None:
         self._saved_world, self._episode = world, episode
@@ -144,7 +144,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         for i, name in enumerate(self.possible_agents):
             if name in self.agents:
                 if name not in actions:
-                    raise ValueError(f"no action for {name}; each of {self.agents} wants one")
+                    raise ValueError(f"no action for {name}; each of {self.agents} needs one")
                 action = checked_actions(actions[name], self._drives[name])
                 commands[0, i] = drive_commands(action)[0, 0]
         self._engine.step(commands, STEPS)
@@ -182,8 +182,8 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         return SavedFleet(self._engine.save(), self._episode())
 
     def restore(self, saved: SavedFleet) -> tuple[Each, Each]:
-        """Makes the episode what it was: for the same actions, what follows is what followed, byte
-        for byte. Returns the observations and infos of those on the way, as `reset` does.
+        """Restores the episode: the same actions then have the same results, byte for byte. Returns
+        the observations and infos of those on the way, as `reset` does.
         """
         if not isinstance(saved, SavedFleet):
             raise TypeError(f"restore() takes what save() gave, not {saved!r}")
@@ -210,7 +210,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         return self._of_agents(self._observations()), {name: {} for name in self.agents}
 
     def _episode(self) -> Each:
-        """What is kept of an episode besides the engine's world."""
+        """The state of an episode besides the engine's world."""
         names = ("agents", "_goals", "_distance", "_actions", "_generator")
         return copy.deepcopy({name: getattr(self, name) for name in names})
 

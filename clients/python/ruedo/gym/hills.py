@@ -41,7 +41,7 @@ class Hills(GoalTask):
         return make_hills(number, robot=self.robot, hills=self.hills)
 
     def failed(self) -> NDArray[np.bool_]:
-        """Who touches something, or leans too much."""
+        """The environments whose robot touches something or leans too much."""
         ahead, left = self._up().T
         steep = np.hypot(ahead, left) > math.sin(MOST_LEAN_RAD)
         return super().failed() | steep

@@ -1,4 +1,4 @@
-"""What a task for learning is: its scenes, observations, actions, rewards and ends.
+"""A task for learning: its scenes, observations, actions, rewards and ends.
 
 `Task` is the class that authors derive from; docs/tasks.md builds one from nothing.
 """
@@ -26,7 +26,7 @@ DRIVE = spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
 class Outcome(NamedTuple):
-    """What came of an action, each an array of (environments,)."""
+    """The outcome of an action; each field is an array of (environments,)."""
 
     rewards: NDArray[np.float64]
     success: NDArray[np.bool_]  # the episode ends, because the task is done
@@ -143,7 +143,7 @@ class Task:
 
 
 def headings(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of (n, 4) orientations w, x, y, z: rad in [-pi, pi]."""
+    """The headings of (n, 4) orientations w, x, y, z: rad in [-pi, pi]."""
     w, x, y, z = quaternions.T
     heading: NDArray[np.float64] = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return heading
@@ -160,7 +160,9 @@ def drive_commands(actions: NDArray[Any]) -> NDArray[np.float64]:
 def drive_rewards(
     progress: NDArray[np.float64], success: NDArray[np.bool_], collision: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Of a step towards a goal: progress in m, + 5 for success, - 5 for a collision, - 0.01."""
+    """The reward of a step towards a goal: progress in m, + 5 for success, - 5 for a collision, -
+    0.01.
+    """
     rewards: NDArray[np.float64] = progress + 5.0 * success - 5.0 * collision - 0.01
     return rewards
 

@@ -184,7 +184,7 @@ class Hunt:
         return content
 
     def case(self, choices: Choices) -> Case:
-        """What is to be run."""
+        """The case to run."""
         content = self.content_of(choices)
         made = self._campaign_of(content)
         boxes = self.space.boxes(choices)
@@ -200,7 +200,7 @@ class Hunt:
         return case
 
     def _case_or_why_not(self, choices: Choices) -> Case | Outcome:
-        """A world that cannot be made breaks nobody: the hunt goes on."""
+        """The case, or why it cannot be made; the hunt continues without it."""
         try:
             return self.case(choices)
         except SpecError as error:
@@ -216,7 +216,7 @@ class Hunt:
         return made
 
     def _with_boxes(self, case: Case, boxes: list[Box]) -> Path:
-        """The world with them, beside copies of what it refers to."""
+        """The world with the boxes, beside copies of the files that it refers to."""
         world = case.what["world"]
         files = self._campaign.worlds.read_with(world["file"], world["spawn"])
         return changed(world, files, self.folder, self._store, lambda text: with_boxes(text, boxes))

@@ -20,7 +20,7 @@ def with_boxes(text: bytes, boxes: list[Box]) -> bytes:
 
 
 def _end_of_world(text: bytes) -> int:
-    """Where its `</world>` begins: not one in a comment."""
+    """The offset of the closing `</world>`, comments aside."""
     found: list[int] = []
     parser = expat.ParserCreate()
 

@@ -17,7 +17,7 @@ _BATCH = 8  # proposals at a time: fixed, so that more workers change nothing
 
 
 def breaks(outcome: dict[str, Any]) -> bool:
-    """A case that cannot be run breaks nobody."""
+    """Whether a case fails; one that cannot be run does not count."""
     return outcome["status"] not in ("passed", "invalid")
 
 

@@ -19,7 +19,7 @@ Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 
 @dataclass(frozen=True)
 class Way:
-    """What of a case may be made smaller. content: of the hunt's file."""
+    """How a case may shrink. content: of the hunt's file."""
 
     content: dict[str, Any]
 
@@ -31,9 +31,7 @@ class Way:
 
     @property
     def may_be_shorter(self) -> bool:
-        """A goal needs its time, and so do a golden log and metrics; a program may be told of the
-        end by a signal.
-        """
+        """A goal needs its time, and so do a golden log and metrics; a signal may end a program."""
         expect = self.content.get("expect", {})
         python = all("python" in one for one in self.content["controllers"])
         return python and not ({"goal", "golden"} & set(expect) or self.content.get("metrics"))
@@ -79,7 +77,7 @@ def shrink(
 
 
 def _simpler(one: Dimension, choices: Choices) -> Iterator[Any]:
-    """Values that are simpler than what there is, the simplest first."""
+    """Values simpler than the present one, the simplest first."""
     value = choices[one.name]
     if value == one.simple or is_idle(one, choices):
         return

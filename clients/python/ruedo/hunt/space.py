@@ -156,7 +156,7 @@ class Space:
 
 
 def is_idle(one: Dimension, choices: Choices) -> bool:
-    """Of an obstacle or fault that is not there."""
+    """Whether an obstacle or fault is absent."""
     return bool(one.owner) and not choices[one.owner]
 
 

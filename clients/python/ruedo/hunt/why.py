@@ -50,7 +50,7 @@ _Again = tuple[Crew, dict[str, Any]]  # what runs a campaign's case again, and i
 
 @dataclass
 class Recorded:
-    """What a log says acted on its run."""
+    """The inputs of a run, from its log."""
 
     path: str
     world: str
@@ -126,7 +126,7 @@ class Recorded:
 
     @contextmanager
     def _blamed(self) -> Iterator[None]:
-        """What is wrong is so in the log."""
+        """Turns an error of the log's contents into a SpecError that names the log."""
         try:
             yield
         except ValueError as error:
@@ -238,7 +238,7 @@ def why(path: str, seeds: int = 5) -> Answer:
 
 
 def _other_parameters(campaign: Campaign, case: Case) -> list[tuple[str, bool, str]]:
-    """What the campaign knows of cases that differ from it in one parameter alone."""
+    """The campaign's results of cases that differ in one parameter alone."""
     results = campaign.results()
     found = []
     for other, row in results.done:
@@ -286,7 +286,7 @@ def _without_models(
 
 
 def files_read(path: str) -> list[Path]:
-    """The log, and where it is one of a campaign, what that was made from."""
+    """The log, and for a campaign's log the campaign's files."""
     case = _case_of(path)
     return [Path(path), *(case[0].files_read if case else [])]
 

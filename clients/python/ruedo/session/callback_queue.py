@@ -1,4 +1,4 @@
-"""What runs the user's callbacks: a thread of its own, so that receiving never waits for them."""
+"""The thread that runs the user's callbacks, so that receiving never waits for them."""
 
 from __future__ import annotations
 

@@ -37,11 +37,11 @@ class Clock:
                     self._news.notify_all()
 
     def is_far_ahead(self, utime: int) -> bool:
-        """Of a time that no message of this run has yet: it was false."""
+        """Whether a time is too far beyond every message of this run to be right."""
         return utime > self.utime + _MOST_AHEAD
 
     def note_tick(self, utime: int) -> None:
-        """A tick of that time came: what another message said of a time long after it was false."""
+        """A tick of that time came: a message with a time long after it was wrong."""
         if utime < self.utime - _MOST_AHEAD:
             self.utime = max(utime, 0)
         self.note(utime)
@@ -58,8 +58,7 @@ class Clock:
         return time.monotonic() - self._last_sign
 
     def sleep(self, duration: int, check: Callable[[], None]) -> None:
-        """duration: us. check: called meanwhile, every 0.5 s at least; what it raises ends the
-        waiting."""
+        """duration: us. check: called at least every 0.5 s; an exception of it ends the wait."""
         sleeper = _Sleeper(threading.get_ident(), duration)
         with self._news:
             self._sleepers.append(sleeper)

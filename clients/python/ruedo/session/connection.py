@@ -1,4 +1,4 @@
-"""What stands behind a Simulation: the bus, the session, what the server says of itself, and sim
+"""The connection behind a Simulation: the bus, the session, what the server says of itself, and sim
 time."""
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class PrivateServer(Protocol):
     """A server that ends with its client."""
 
     def ended(self) -> str | None:
-        """Why it is gone; None while it runs."""
+        """Why the server is gone; None while it runs."""
 
     def is_done(self) -> bool:
         """Whether it has ended in good order."""
@@ -63,7 +63,7 @@ class PrivateServer(Protocol):
         """How far this client has come, which may be lost."""
 
     def warnings(self) -> list[str]:
-        """What it has said since the last call."""
+        """The server's warnings since the last call."""
 
     def forked(self) -> None:
         """In a fork's child: the server is the parent's."""
@@ -146,7 +146,7 @@ class Connection:
             self.faults.print_kept()
 
     def _close_at_end(self) -> None:
-        """Of the program, which ends beside a callback that does not return."""
+        """Closes at the program's end, even while a callback does not return."""
         self._close(_CALLBACK_SECONDS)
 
     def _close(self, patience: float | None) -> bool:
@@ -259,7 +259,7 @@ class Connection:
         self.clock.sleep(duration, check)
 
     def standstill(self, call: str) -> Standstill:
-        """For a call that waits for sim time."""
+        """A watch for a call that waits for sim time, which says why it stands."""
         return Standstill(self.clock, call, lambda: self._why_it_stands(self.stepper.whose_turn()))
 
     def _why_it_stands(self, in_lockstep: str) -> str:
@@ -290,7 +290,7 @@ class Connection:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether what comes may be of the next run, of which there is no info yet."""
+        """Whether messages may be of the next run, whose info has not arrived yet."""
         return self._watch.in_doubt
 
     # What the server says of itself.
@@ -302,7 +302,7 @@ class Connection:
 
     @property
     def version(self) -> str:
-        """Of the server."""
+        """The version of the server."""
         return self.info.version
 
     @property
@@ -474,7 +474,7 @@ class Connection:
         return None if utime is None else min(utime, self.clock.utime)
 
     def _note_progress(self, epoch: int, utime: int) -> None:
-        """What was sent up to that time has come."""
+        """Reports that everything up to that sim time has arrived and its callbacks have run."""
         if self.callbacks.is_idle:
             self.progress.received(epoch, utime)
         else:

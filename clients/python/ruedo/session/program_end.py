@@ -19,7 +19,7 @@ from ..errors import RuedoError, RunEnded
 
 
 class CallbackFaults:
-    """What the callbacks of a connection raised. Safe to use from any thread."""
+    """The exceptions of a connection's callbacks. Safe to use from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

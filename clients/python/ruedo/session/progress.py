@@ -22,16 +22,14 @@ _PATIENCE_SECONDS = 0.5
 Tell = Callable[[str], object]
 
 FIRST = f"0 0 {_NEVER}\n"
-"""The line of a program that has received nothing yet."""
+"""The progress line of a program that has received nothing yet."""
 
 _LEFT = "-1 0 0\n"
 _connections = itertools.count()  # of this process, to regressions
 
 
 class ToRegression:
-    """The pipe by which `ruedo regress` is told how far the client that it launched is
-    (docs/protocol.md).
-    """
+    """The pipe that reports a launched client's progress to `ruedo regress` (docs/protocol.md)."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -39,7 +37,7 @@ class ToRegression:
         self.tell(FIRST)
 
     def tell(self, line: str) -> None:
-        """Where the pipe is full, a later line says it all."""
+        """Writes a line; when the pipe is full, a later line replaces it."""
         with contextlib.suppress(OSError):
             os.write(self._descriptor, f"{line[:-1]} {self._sender}\n".encode())
 
@@ -83,7 +81,7 @@ class Progress:
 
     @property
     def in_use(self) -> bool:
-        """Whether it is to be told again soon: a thread works with what it was given."""
+        """Whether progress must be reported again soon, since a thread is using a sample."""
         return bool(self._uses)
 
     def received(self, epoch: int, utime: int) -> None:
@@ -116,7 +114,7 @@ class Progress:
                 self._say()
 
     def say(self) -> None:
-        """While a thread works the run goes on as in real time."""
+        """Reports the progress. While a thread computes, the run continues as in real time."""
         with self._lock:
             self._say()
 

@@ -10,12 +10,13 @@ _RETURNS = 3  # one may be a datagram that was late
 
 
 class RunWatch:
-    """A client stays with its run for as long as that is heard: what else is heard meanwhile is
-    another server, at the same address. Only when nothing more comes of its own run has the other
-    one taken its place. Until it shows
-    which, samples may be of either run. For the receiving thread alone, but for `another`.
+    """Decides which run a client belongs to, for the receiving thread alone, but for `another`.
 
-    say: called once for each run of the client's, with the id of a run that goes on beside it.
+    A client stays with its run while it receives messages of it; other runs are then those of
+    another server at the same address. When its run falls silent, the other run is its successor.
+    Until that is decided, samples may be of either run.
+
+    say: called once for each run of the client's, with the id of a run beside it.
     """
 
     def __init__(self, say: Callable[[int], None]):

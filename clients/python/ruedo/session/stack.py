@@ -1,4 +1,4 @@
-"""Where a thread is: in a call of this package, or in a callback of its user's."""
+"""Whether a thread is in a call of this package, or in a callback of its user's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _is_ours(frame: FrameType) -> bool:
 
 
 def is_in_another_call() -> bool:
-    """Whether a call of this package, outside of the one that asks, goes on in this thread: it was
+    """Whether another call of this package is under way in this thread: it was
     interrupted, or it calls back."""
     outside, frame = False, inspect.currentframe()
     while frame is not None:

@@ -1,4 +1,4 @@
-"""Whether sim time goes on while a call waits for it, and why it may not."""
+"""Whether sim time advances while a call waits for it, and if not, why."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ log = logging.getLogger("ruedo")
 
 
 class Standstill:
-    """Of one call, in its thread.
+    """The watch of one call, in its thread.
 
     what: the call, for the log. why: why sim time may stand still; "": it is not known to.
     """
@@ -39,7 +39,7 @@ class Standstill:
         )
 
     def reason(self) -> str:
-        """Why the call has waited in vain; "": sim time goes on, or nothing is known."""
+        """Why the call waits in vain; "": sim time advances, or the reason is unknown."""
         stands_for = self._stands_for()
         return self._why() if stands_for >= 1.0 or self._since == self._began else ""
 

@@ -1,4 +1,4 @@
-"""LCM URLs: which one is meant, and what it says."""
+"""LCM URLs: the one in effect, and its parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done with every message that comes: of a fleet in lockstep hundreds with each step.
+"""The handling of each arriving message: of a fleet in lockstep hundreds with each step.
 
 compiled() puts the engine module's functions into the place of those here, where it is installed.
 """
@@ -93,8 +93,9 @@ _COMPILED = ("take_apart", "dispatch", "are_listed", "by_channel")
 
 
 def compiled() -> bool:
-    """Takes the engine module's; False where there is none. Importing it takes some ms, which are
-    for who steps alone."""
+    """Uses the functions of the engine module; False without it. Importing it takes some ms, which
+    are for who steps alone.
+    """
     try:
         from .. import _engine
     except ImportError:

@@ -86,7 +86,7 @@ class Bus:
 
     @property
     def is_connected(self) -> bool:
-        """False: what is published now reaches nobody."""
+        """False while published messages have no receiver."""
         return self._transport.is_connected
 
     @staticmethod

@@ -96,7 +96,9 @@ class _Sender:
 
 
 class MulticastTransport:
-    """What waits is in the socket's buffer alone, for all channels together."""
+    """LCM's multicast. Waiting messages are in the socket's buffer alone, of all channels
+    together.
+    """
 
     loses_nothing = False
     is_connected = True

@@ -35,7 +35,7 @@ _CHUNK = 1 << 18  # bytes received at a time
 
 
 def connect(address: Address) -> socket.socket:
-    """To a tcpq or unix address. Raises OSError when nobody serves there."""
+    """Connects to a tcpq or unix address. Raises OSError when no server listens there."""
     local = address.scheme == "unix"
     end = socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_STREAM)
     try:
@@ -83,7 +83,7 @@ def is_served(address: Address) -> bool:
 
 
 def is_readable(end: socket.socket) -> bool:
-    """Any thread: a poll object is one thread's."""
+    """Whether data can be read. For any thread: a poll object belongs to one."""
     poll = select.poll()
     try:
         poll.register(end, select.POLLIN)
@@ -96,7 +96,7 @@ class StreamTransport:
     """Connects again when the server comes back."""
 
     def __init__(self, address: Address):
-        """Raises OSError when nobody serves there."""
+        """Raises OSError when no server listens there."""
         self.loses_nothing = address.scheme == "unix"
         self.busy = False
         self._address = address

@@ -1,4 +1,4 @@
-"""What carries messages: the interface, and which one a URL wants."""
+"""Transports of messages: the interface, and the one for a URL."""
 
 from __future__ import annotations
 
