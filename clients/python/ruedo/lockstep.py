@@ -388,8 +388,9 @@ class Stepper:
         return b"".join(parts)
 
     def _wait(self, until: int, timeout: float) -> None:
-        """Waits for the states up to `until` with all their messages. After a silence it repeats the
-        grant, or the request for missing messages, sooner at first."""
+        """Waits for the states up to `until` with all their messages. After a silence it repeats
+        the grant, or the request for missing messages, sooner at first.
+        """
         if self._taken and self._have >= until:
             return
         first = _LAST_REPEAT if self._connection.bus.loses_nothing else _FIRST_REPEAT
