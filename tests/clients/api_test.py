@@ -308,6 +308,19 @@ def test_maps_are_read_and_written(language, tmp_path):
         assert words in said.one(what)
 
 
+def test_maps_of_worlds_are_read_alike(language, tmp_path):
+    """What `ruedo map` writes, by each reader as by Python's, which has PyYAML."""
+    import ruedo
+
+    subprocess.run([RUEDO, "map", "arena", "-o", tmp_path / "given.yaml"], check=True)
+    with ruedo_run("--paused", "--disable", "p3at/camera", world=HALL) as server:
+        said = api(language, server.url, "map_files", str(tmp_path))
+    given = ruedo.load_map(tmp_path / "given.yaml")
+    assert said.numbers("map") == [*given.cells.shape, given.resolution, *given.origin]
+    assert said.numbers("cells") == given.cells.ravel().tolist()
+    assert (ruedo.load_map(tmp_path / "saved.yaml").cells == given.cells).all()
+
+
 def camera(name, type, more, after=""):
     return (
         f"<sensor name='{name}' type='{type}'><update_rate>5</update_rate>{after}<camera><horizontal_fov>1.5707963267948966"

@@ -169,8 +169,9 @@ def test_a_program_of_the_clients_words(language, prefix, tmp_path):
             pytest.skip("no JDK here")
         run("javac", "-Xlint:all", "-cp", jar, "-d", tmp_path, here / "Api.java")
         words = ["java", "-cp", f"{jar}:{tmp_path}", "Api"]
-    said = run(*words, tmp_path, cwd=tmp_path, more=more)
-    assert said == "rate 20\ndrove True\njoint position\nray 0.95\n"
+    lines = run(*words, tmp_path, cwd=tmp_path, more=more).splitlines()
+    said = [line for line in lines if not line.startswith("ruedo: ")]  # a busy machine is warned of
+    assert said == ["rate 20", "drove True", "joint position", "ray 0.95"]
 
 
 def test_what_a_project_installs_starts(prefix, tmp_path):
