@@ -5,8 +5,9 @@ nav2_system.py NAV2_SYSTEM_TESTS NAV2_MINIMAL_TB3_SIM [OPTION...] [TEST...]
 The first two are folders of Nav2's sources. The programs that these tests start instead of a
 simulator's (`gz`, ros_gz_sim's `create`, robot_state_publisher, whose frames Ruedo has) come from
 an overlay that is made here. Prints a JSON line for each run of a test; ends with 1 if one failed.
-For a busy machine: --rate (sim time per real time), --server-timeout (ms instead of their 20),
---startup (s instead of the 10 that testers give Nav2), --limit (s instead of 180 for a test).
+For a busy machine: --rate (sim time per real time), --server-timeout (ms instead of their 20, and
+no server is given up that is not heard for 4 s), --startup (s instead of the 10 that testers give
+Nav2), --limit (s instead of 180 for a test).
 Where MPPI is not built, regulated pure pursuit takes its place.
 """
 
@@ -90,6 +91,10 @@ def overlay(prefix: Path, options: argparse.Namespace) -> None:
         file.write_text(
             file.read_text().replace("time.sleep(10)", f"time.sleep({options.startup})")
         )
+    if options.server_timeout:
+        for file in (share / "nav2_bringup/launch").glob("*.py"):
+            manager = "parameters=[{'autostart': autostart"
+            file.write_text(file.read_text().replace(manager, f"{manager}, 'bond_timeout': 0.0"))
     for file in share.rglob("*params.yaml"):
         text = file.read_text()
         if options.server_timeout:

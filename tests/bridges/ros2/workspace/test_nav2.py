@@ -26,8 +26,20 @@ HERE = Path(__file__).parent
 CONFIG = SOURCE / "clients/ros2/ruedo_ros/config"
 RPP = {"plugin": "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"}
 NAVFN = {"plugin": "nav2_navfn_planner::NavfnPlanner"}
+THETA_STAR = {"plugin": "nav2_theta_star_planner::ThetaStarPlanner"}
+DWB = {  # with the critics and scales of Nav2's guide
+    "plugin": "dwb_core::DWBLocalPlanner",
+    "critics": [
+        *("RotateToGoal", "Oscillation", "BaseObstacle"),
+        *("GoalAlign", "PathAlign", "PathDist", "GoalDist"),
+    ],
+    **{f"{name}.scale": 32.0 for name in ("RotateToGoal", "PathAlign", "PathDist")},
+    **{f"{name}.scale": 24.0 for name in ("GoalAlign", "GoalDist")},
+    **{f"{name}.forward_point_distance": 0.1 for name in ("PathAlign", "GoalAlign")},
+    "BaseObstacle.scale": 0.02,
+}
 PROCESSES = ["use_composition:=False"]  # a process for each of Nav2's servers
-TOLERANCE_M = 0.25 + 0.1  # Nav2's own, and AMCL's error
+TOLERANCE_M = 0.25 + 0.15  # Nav2's own, and AMCL's error
 OF_NAV2 = ("ruedo_ros", "nav2_bringup", "nav2_simple_commander")
 
 
@@ -121,14 +133,14 @@ def merged(base, over):
     return both
 
 
-def of_servers(folder, world, *robot):
+def of_servers(folder, world, *robot, **plugins):
     """Parameters for servers.launch.py, in which the tree plans once."""
     share = {
         name: Path(get_package_share_directory(f"nav2_{name}"))
         for name in ("bringup", "bt_navigator")
     }
     nodes = yaml.safe_load((share["bringup"] / "params/nav2_params.yaml").read_text())
-    nodes = merged(nodes, yaml.safe_load(parameters(folder, *robot).read_text()))
+    nodes = merged(nodes, yaml.safe_load(parameters(folder, *robot, **plugins).read_text()))
     nodes["map_server"] = {"ros__parameters": {"yaml_filename": str(map_of(world, folder))}}
     tree = (
         share["bt_navigator"] / "behavior_trees/navigate_w_replanning_only_if_goal_is_updated.xml"
@@ -143,6 +155,17 @@ def of_servers(folder, world, *robot):
 def written(nodes, file):
     file.write_text(yaml.safe_dump(nodes))
     return file
+
+
+@needs("nav2_theta_star_planner", "dwb_critics", "dwb_plugins", *OF_NAV2)
+def test_goals_are_reached_by_another_planner_and_controller(tmp_path):
+    nodes = of_servers(tmp_path, "arena", "p3at", planner=THETA_STAR, controller=DWB)
+    file = written(nodes, tmp_path / "servers.yaml")
+    with Run("--rate", "0.3", "--remap", "/initialpose=/set_pose", lcm="memq://") as run:
+        ros = Ros(run, MIDDLEWARES[0])
+        words = [HERE / "servers.launch.py", f"params_file:={file}"]
+        with launched(ros, tmp_path / "nav2.log", *words):
+            assert arrived(answer(script(ros, "navigate.py", "", [[-3.5, 0.0], [-1.0, -3.8]])))
 
 
 FLEET = SOURCE / "worlds/fleet.sdf"
