@@ -1074,13 +1074,15 @@ Simulation launch(const std::string& world, const LaunchOptions& options = {});
 class LogFile;  // clients/cpp/log.cpp
 
 /// What a run recorded (`ruedo run --record`), or any other log of LCM's: its messages by channel.
-/// They are read from the file when they are asked for. Copies share the file.
+/// They are read from the file when they are asked for, so that a log of any size is opened at
+/// once. Copies share the file. Thread safe.
 class Log {
  public:
   /// @cond
   explicit Log(std::shared_ptr<const LogFile> file) : file_(std::move(file)) {}
   /// @endcond
 
+  /// The first call of this, count() or fault() reads the log through.
   /// @return their names, sorted
   [[nodiscard]] std::vector<std::string> channels() const;
   /// @param channel its name
@@ -1098,15 +1100,40 @@ class Log {
   /// no longer be read
   template <class SampleType>
   [[nodiscard]] std::vector<SampleType> samples(const std::string& channel) const;
-  /// The same as objects of a class that lcm-gen made.
+  /// Calls `use` with each sample on a channel, in order; of a log of any size one is in memory:
+  /// `log.each<Scan>("p3at/lrf", [](const Scan& scan) { ... }, 10, 20)`.
+  /// @param channel its name
+  /// @param use what it throws ends the reading
+  /// @param begin only samples from then on, s of the log's time: what comes before is not read
+  /// @param end only samples up to then, s, itself included
+  /// @throws as samples()
+  template <class SampleType>
+  void each(const std::string& channel, const std::function<void(const SampleType&)>& use,
+            double begin = -std::numeric_limits<double>::infinity(),
+            double end = std::numeric_limits<double>::infinity()) const;
+  /// The same with objects of a class that lcm-gen made.
+  /// @param channel its name
+  /// @param use what it throws ends the reading
+  /// @param begin s
+  /// @param end s
+  /// @throws as samples()
+  template <class Message>
+  void each_message(const std::string& channel, const std::function<void(const Message&)>& use,
+                    double begin = -std::numeric_limits<double>::infinity(),
+                    double end = std::numeric_limits<double>::infinity()) const {
+    each<RawSample>(
+        channel,
+        [&](const RawSample& raw) { use(MessageStream<Message>::decoded(channel, raw.bytes)); },
+        begin, end);
+  }
+  /// All as objects of a class that lcm-gen made.
   /// @param channel its name
   /// @return all of them
   /// @throws as samples()
   template <class Message>
   [[nodiscard]] std::vector<Message> messages(const std::string& channel) const {
     std::vector<Message> found;
-    for (const RawSample& raw : samples<RawSample>(channel))
-      found.push_back(MessageStream<Message>::decoded(channel, raw.bytes));
+    each_message<Message>(channel, [&](const Message& message) { found.push_back(message); });
     return found;
   }
 

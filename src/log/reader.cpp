@@ -8,13 +8,11 @@
 
 #include "base/big_endian.h"
 #include "base/lcm_log.h"
-#include "base/message_size.h"
+#include "base/log_search.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
 namespace {
-
-constexpr uint32_t kMaxChannel = 1000;
 
 // What others play: a bag's folder, and a file of MCAP, which begins with this.
 constexpr uint32_t kMcap = 0x894D4341;
@@ -71,62 +69,11 @@ void Reader::seek(int64_t offset) {
   offset_ = offset;
 }
 
-namespace {
-
-constexpr size_t kLookedAt =
-    1 << 16;  // bytes at a time in which an event's beginning is looked for
-
-// Whether an event may begin with these bytes.
-bool is_head(const uint8_t* head) {
-  const auto time = read_big_endian<int64_t>(head + 12);
-  return read_big_endian<uint32_t>(head) == kLogSync &&
-         read_big_endian<uint32_t>(head + 20) <= kMaxChannel &&
-         read_big_endian<uint32_t>(head + 24) <= kLargestMessage && time >= -kLatestLogTime_us &&
-         time <= kLatestLogTime_us;
-}
-
-int64_t size_by(const uint8_t* head) {
-  return int64_t{kLogHeadSize} + read_big_endian<uint32_t>(head + 20) +
-         read_big_endian<uint32_t>(head + 24);
-}
-
-}  // namespace
-
-// The first one that begins between the two; what only looks like one in a message has no other
-// behind it.
-std::optional<int64_t> Reader::event_after(int64_t offset, int64_t end) {
-  std::vector<uint8_t> bytes(kLookedAt + kLogHeadSize);
-  for (; offset < end; offset += kLookedAt) {
-    seek(offset);
-    const size_t got = std::fread(bytes.data(), 1, bytes.size(), file_.get());
-    for (size_t i = 0; i + kLogHeadSize <= got && i < kLookedAt; ++i) {
-      const int64_t at = offset + static_cast<int64_t>(i);
-      if (at >= end) return {};
-      if (!is_head(bytes.data() + i)) continue;
-      const int64_t behind = at + size_by(bytes.data() + i);
-      std::array<uint8_t, kLogHeadSize> head{};
-      seek(behind);
-      if (behind == size_ || (read(head.data(), head.size()) && is_head(head.data()))) return at;
-    }
-  }
-  return {};
-}
-
 void Reader::seek_time(SimTime time_us) {
-  constexpr int64_t kNear = 1 << 20;  // bytes that are read faster than halved
-  int64_t low = 0, high = size_;  // an event begins at low, and is before the time, or the first
-  while (high - low > kNear) {
-    const int64_t middle = low + (high - low) / 2;
-    const std::optional<int64_t> found = event_after(middle, high);
-    std::array<uint8_t, kLogHeadSize> head{};
-    if (found) seek(*found);
-    if (found && read(head.data(), head.size()) &&
-        read_big_endian<int64_t>(head.data() + 12) < time_us)
-      low = *found;
-    else
-      high = middle;
-  }
-  seek(low);
+  seek(find_log_time(time_us, size_, [this](int64_t offset, uint8_t* into, size_t size) {
+    seek(offset);
+    return std::fread(into, 1, size, file_.get());
+  }));
 }
 
 bool Reader::next(Event& event, const std::function<bool(const std::string&)>& wanted) {
@@ -151,7 +98,7 @@ bool Reader::read_event(Event& event, const std::function<bool(const std::string
   const uint32_t data_size = read_big_endian<uint32_t>(head.data() + 24);
   event.number = read_big_endian<int64_t>(head.data() + 4);
   event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
-  if (!is_head(head.data())) {
+  if (!is_log_head(head.data())) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;
   }

@@ -50,7 +50,6 @@ class Reader {
   bool read_event(Event& event, const std::function<bool(const std::string&)>& wanted);
   bool read(void* into, size_t size);
   bool skip(size_t size);
-  std::optional<int64_t> event_after(int64_t offset, int64_t end);
 
   std::string path_;
   std::unique_ptr<std::FILE, InputFile::Close> file_;

@@ -1,5 +1,6 @@
 """Recorded runs, read by the client libraries."""
 
+import itertools
 import os
 import subprocess
 import sys
@@ -45,6 +46,24 @@ def test_samples_by_channel(language, log):
         unknown = said.one("unknown")
         assert "UnknownName:" in unknown and "has no channel 'nobody'; it has " in unknown
         assert "TypeMismatch: p3at/pose carries " in said.one("mismatch")
+
+
+@pytest.mark.parametrize("repeats, begin", [(1, 0.3), (120, 84.3)])
+def test_samples_of_a_time(language, log, tmp_path, repeats, begin):
+    """50 Hz: from 0.3 to 0.5 s there are 11, in a long log found by halves."""
+    if language == "python":
+        return
+    data, path = log.read_bytes(), tmp_path / "long.lcm"
+    places = [*events(data), len(data)]
+    with open(path, "wb") as out:
+        for repeat in range(repeats):
+            for at, end in itertools.pairwise(places):
+                time = int.from_bytes(data[at + 12 : at + 20], "big") + repeat * 2_000_000
+                out.write(data[at : at + 12] + time.to_bytes(8, "big") + data[at + 20 : end])
+    assert repeats == 1 or path.stat().st_size > 4 << 20
+    said = probe(language, "-", "log", str(path), str(begin))
+    assert said.numbers("range") == [11, 3e5, 5e5]
+    assert said.one("beyond") == "11"
 
 
 def test_columns_are_those_of_the_live_samples(tmp_path):

@@ -643,6 +643,12 @@ public final class Probe {
         List<byte[]> raw = log.bytes("p3at/pose");
         say("raw", raw.get(raw.size() - 1).length);
         say("fault", log.fault());
+        List<Long> times = new ArrayList<>();
+        double begin = a.length > 1 ? Double.parseDouble(a[1]) : 0.3;
+        log.each("p3at/pose", Pose.class, begin, begin + 0.2, each -> times.add(each.utime));
+        say("range", times.size(), times.get(0), times.get(times.size() - 1));
+        log.each("p3at/pose", Pose.class, 1e6, Double.POSITIVE_INFINITY, each -> times.add(0L));
+        say("beyond", times.size());
         attempt("unknown", () -> log.samples("nobody", Scan.class));
         attempt("mismatch", () -> log.samples("p3at/pose", Scan.class));
     }

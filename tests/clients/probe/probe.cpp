@@ -584,6 +584,13 @@ void read_log(const std::vector<std::string>& a) {
   say("poses", poses.size(), poses.back().utime, poses.back().position[0]);
   say("raw", log.samples<rc::RawSample>("p3at/pose").back().bytes.size());
   say("fault", log.fault());
+  std::vector<int64_t> times;
+  const double begin = a.size() > 1 ? std::stod(a[1]) : 0.3;
+  log.each<rc::Pose>(
+      "p3at/pose", [&](const rc::Pose& each) { times.push_back(each.utime); }, begin, begin + 0.2);
+  say("range", times.size(), times.front(), times.back());
+  log.each<rc::Pose>("p3at/pose", [&](const rc::Pose& each) { times.push_back(each.utime); }, 1e6);
+  say("beyond", times.size());
   report("unknown", [&] { static_cast<void>(log.samples<rc::Scan>("nobody")); });
   report("mismatch", [&] { static_cast<void>(log.samples<rc::Scan>("p3at/pose")); });
 }

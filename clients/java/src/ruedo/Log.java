@@ -1,98 +1,58 @@
 package ruedo;
 
-import java.io.File;
 import java.io.IOException;
-import java.io.RandomAccessFile;
-import java.nio.ByteBuffer;
-import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
+import java.util.function.Consumer;
 
 /**
  * What a run recorded: its messages by channel. They are read from the file when they are asked
- * for. {@link Ruedo#readLog} makes it. Thread safe.
- *
- * <p>An event of LCM's log is, big endian: sync word, number, time, lengths of channel and data,
- * channel, data.
+ * for, so that a log of any size is opened at once. {@link Ruedo#readLog} makes it. Thread safe.
  */
 public final class Log {
-    private static final int SYNC = 0xEDA1DA01;
-    private static final int HEAD = 28;
-    private static final int LONGEST_CHANNEL = 1000;
-
-    /** Of a message, in bytes: a picture of 8192 x 8192 pixels. */
-    private static final int LARGEST = 8192 * 8192 * 4 + 65536;
-
-    private static final class Place {
-        final long offset; // of the data
-        final int size;
-
-        Place(long offset, int size) {
-            this.offset = offset;
-            this.size = size;
-        }
-    }
+    private static final double ALWAYS = Double.POSITIVE_INFINITY;
 
     private final String path;
-    private final Map<String, List<Place>> places = new TreeMap<>();
+    private Map<String, Integer> counts; // messages by channel; null: not read yet
     private String fault = "";
 
     Log(String path) {
         this.path = path;
-        if (!new File(path).isFile()) {
-            boolean there = new File(path).exists();
-            throw new RuedoException(
-                    path + (there ? ": it is not a file that can be read" : ": no such file"));
-        }
-        try (RandomAccessFile file = new RandomAccessFile(path, "r")) {
-            long begin = 0;
-            while (begin >= 0 && begin < file.length()) begin = addEvent(file, begin);
+        try (LogReader first = new LogReader(path)) {
+            if (!first.next() && !first.fault.isEmpty())
+                throw new RuedoException(path + ": it is not an LCM log: " + first.fault);
         } catch (IOException error) {
             throw new RuedoException(path + ": " + error.getMessage());
         }
-        if (!fault.isEmpty() && places.isEmpty())
-            throw new RuedoException(path + ": it is not an LCM log: " + fault);
     }
 
-    /** Where the next one begins; -1 where the log was cut off, or is damaged. */
-    private long addEvent(RandomAccessFile file, long begin) throws IOException {
-        byte[] head = new byte[(int) Math.min(HEAD, file.length() - begin)];
-        file.seek(begin);
-        file.readFully(head);
-        ByteBuffer numbers = ByteBuffer.wrap(head);
-        String cutOff = "it was cut off in the event that begins at byte " + begin;
-        String damaged = "it is damaged at byte " + begin;
-        if (head.length < 4) return wrong(cutOff);
-        if (numbers.getInt(0) != SYNC) return wrong(damaged);
-        if (head.length < HEAD) return wrong(cutOff);
-        int nameSize = numbers.getInt(20);
-        int size = numbers.getInt(24);
-        if (nameSize < 0 || nameSize > LONGEST_CHANNEL || size < 0 || size > LARGEST)
-            return wrong(damaged);
-        long data = begin + HEAD + nameSize;
-        if (data + size > file.length()) return wrong(cutOff); // before memory is taken for it
-        byte[] name = new byte[nameSize];
-        file.readFully(name);
-        places.computeIfAbsent(new String(name, StandardCharsets.UTF_8), key -> new ArrayList<>())
-                .add(new Place(data, size));
-        return data + size;
+    /** Reads the log through, once. */
+    private synchronized Map<String, Integer> counts() {
+        if (counts != null) return counts;
+        Map<String, Integer> found = new TreeMap<>();
+        try (LogReader reader = new LogReader(path)) {
+            while (reader.next()) found.merge(reader.channel, 1, Integer::sum);
+            fault = reader.fault;
+        } catch (IOException error) {
+            throw new RuedoException(path + ": " + error.getMessage());
+        }
+        counts = found;
+        return found;
     }
 
-    private long wrong(String what) {
-        fault = what;
-        return -1;
-    }
-
-    /** The channels of the log, sorted. */
+    /**
+     * The channels of the log, sorted. The first call of this, {@link #count} or {@link #fault}
+     * reads the log through.
+     */
     public List<String> channels() {
-        return List.copyOf(places.keySet());
+        return List.copyOf(counts().keySet());
     }
 
     /** The number of messages on a channel; 0 for one that is not in the log. */
     public int count(String channel) {
-        return places.getOrDefault(channel, List.of()).size();
+        return counts().getOrDefault(channel, 0);
     }
 
     /**
@@ -100,6 +60,7 @@ public final class Log {
      * What came before that is here.
      */
     public String fault() {
+        counts();
         return fault;
     }
 
@@ -109,54 +70,91 @@ public final class Log {
      */
     public <T extends Sample> List<T> samples(String channel, Class<T> kind) {
         List<T> samples = new ArrayList<>();
-        for (byte[] message : bytes(channel)) {
-            Sample sample = decoded(channel, message, null);
-            if (!kind.isInstance(sample)) {
-                throw new RuedoException.TypeMismatch(
-                        channel
-                                + " carries samples of "
-                                + sample.getClass().getSimpleName()
-                                + ", not of "
-                                + kind.getSimpleName());
-            }
-            samples.add(kind.cast(sample));
-        }
+        each(channel, kind, -ALWAYS, ALWAYS, samples::add);
         return samples;
     }
 
+    /**
+     * Calls {@code use} with each sample on a channel from {@code begin} to {@code end}, s of the
+     * log's time, both included, in order: of a log of any size one is in memory. What comes before
+     * is not read; infinities stand for the log's beginning and end. Throws as {@link #samples}.
+     */
+    public <T extends Sample> void each(
+            String channel, Class<T> kind, double begin, double end, Consumer<? super T> use) {
+        eachBytes(
+                channel,
+                begin,
+                end,
+                message -> {
+                    Sample sample = decoded(channel, message, null);
+                    if (!kind.isInstance(sample)) {
+                        throw new RuedoException.TypeMismatch(
+                                channel
+                                        + " carries samples of "
+                                        + sample.getClass().getSimpleName()
+                                        + ", not of "
+                                        + kind.getSimpleName());
+                    }
+                    use.accept(kind.cast(sample));
+                });
+    }
+
     /** The messages on a channel as objects of a class that lcm-gen made. */
-    @SuppressWarnings("unchecked")
     public <M> List<M> messages(String channel, Class<M> type) {
-        Conversions.Conversion conversion = MessageSample.of(type);
         List<M> messages = new ArrayList<>();
-        for (byte[] message : bytes(channel))
-            messages.add(((MessageSample<M>) decoded(channel, message, conversion)).message);
+        eachMessage(channel, type, -ALWAYS, ALWAYS, messages::add);
         return messages;
+    }
+
+    /** As {@link #each}, with objects of a class that lcm-gen made. */
+    @SuppressWarnings("unchecked")
+    public <M> void eachMessage(
+            String channel, Class<M> type, double begin, double end, Consumer<? super M> use) {
+        Conversions.Conversion conversion = MessageSample.of(type);
+        eachBytes(
+                channel,
+                begin,
+                end,
+                message ->
+                        use.accept(
+                                ((MessageSample<M>) decoded(channel, message, conversion))
+                                        .message));
     }
 
     /** The messages on a channel as they are, each type's fingerprint first. */
     public List<byte[]> bytes(String channel) {
-        List<Place> found = places.get(channel);
-        if (found == null) {
-            throw new RuedoException.UnknownName(
-                    path
-                            + " has no channel '"
-                            + channel
-                            + "'; it has "
-                            + (places.isEmpty() ? "none" : String.join(", ", places.keySet())));
-        }
         List<byte[]> messages = new ArrayList<>();
-        try (RandomAccessFile file = new RandomAccessFile(path, "r")) {
-            for (Place place : found) {
-                byte[] message = new byte[place.size];
-                file.seek(place.offset);
-                file.readFully(message);
-                messages.add(message);
+        eachBytes(channel, -ALWAYS, ALWAYS, messages::add);
+        return messages;
+    }
+
+    /** As {@link #each}, with the messages as they are, each type's fingerprint first. */
+    public void eachBytes(String channel, double begin, double end, Consumer<byte[]> use) {
+        long beginUs = microseconds(begin);
+        long endUs = microseconds(end);
+        boolean found = false;
+        try (LogReader reader = new LogReader(path)) {
+            if (beginUs > -LogReader.LATEST) reader.seekTime(beginUs);
+            while (reader.next() && reader.time <= endUs) {
+                if (reader.time < beginUs || !reader.channel.equals(channel)) continue;
+                found = true;
+                use.accept(reader.data());
             }
         } catch (IOException error) {
             throw new RuedoException(path + ": it cannot be read any more: " + error.getMessage());
         }
-        return messages;
+        if (found || counts().containsKey(channel)) return;
+        throw new RuedoException.UnknownName(
+                path
+                        + " has no channel '"
+                        + channel
+                        + "'; it has "
+                        + (counts().isEmpty() ? "none" : String.join(", ", counts().keySet())));
+    }
+
+    private static long microseconds(double time) {
+        double latest = LogReader.LATEST * 1e-6;
+        return Math.round(Math.min(Math.max(time, -latest), latest) * 1e6);
     }
 
     /** given: null takes the one that the message's fingerprint says. */
