@@ -133,20 +133,20 @@ FILES = {
     "missing picture": (
         heightmap("none.png"),
         {},
-        1,
-        ("error", 4, COLLISION, "the heightmap 'none.png' is not found"),
+        3,
+        ("error", 4, "", "the heightmap 'none.png' is not found"),
     ),
     "broken picture": (
         heightmap("a.png"),
         {"a.png": PNG + bytes(40)},
-        1,
-        ("error", 4, COLLISION, "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)"),
+        3,
+        ("error", 4, "", "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)"),
     ),
     "huge picture": (
         heightmap("a.png"),
         {"a.png": png(200000, 200000)},
-        1,
-        ("error", 4, COLLISION, "200000 x 200000 pixels; allowed are 1025 each way"),
+        3,
+        ("error", 4, "", "200000 x 200000 pixels; allowed are 8193 each way"),
     ),
     "missing texture": (
         texture("none.png"),

@@ -4,7 +4,7 @@
 #include "budget.h"
 #include "scratch_file.h"
 #include "world/maps/occupancy.h"
-#include "world/read/geometry.h"
+#include "world/read/height_maps.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace ruedo::world;

@@ -13,6 +13,7 @@
 #include "world/mesh/mesh_loader.h"
 #include "world/mesh/picture.h"
 #include "world/read/geometry.h"
+#include "world/read/height_maps.h"
 
 namespace ruedo::world {
 namespace {
@@ -500,7 +501,7 @@ TEST(MadeMeshes, HeightmapOfTwoByTwo) {
   // A portable grey map: heights 0, 255 / 0, 51; the first row is at +y.
   const std::string path =
       folder.write("h.pgm", std::string("P5\n2 2\n255\n") + std::string("\x00\xff\x00\x33", 4));
-  const Mesh mesh = heightmap(path, {4, 6, 10});
+  const Mesh mesh = triangles_of(heightmap(path, {4, 6, 10}));
   ASSERT_EQ(mesh.positions.size(), 4u);
   EXPECT_TRUE(mesh.positions[1].isApprox(Eigen::Vector3f(2, 3, 10)));
   EXPECT_TRUE(mesh.positions[3].isApprox(Eigen::Vector3f(2, -3, 2)));
@@ -523,10 +524,33 @@ TEST(MadeMeshes, HeightmapOfElevations) {
   elevation.at<float>(1, 1) = 110.0f;
   std::vector<uint8_t> bytes;
   encode_picture(".tiff", elevation, bytes, {});
-  const Mesh mesh =
+  const HeightGrid grid =
       heightmap(folder.write("dem.tif", std::string(bytes.begin(), bytes.end())), {4, 6, 8});
   const double heights[] = {0.0, 8.0, 0.0, 2.0};
-  for (int i = 0; i < 4; ++i) EXPECT_NEAR(mesh.positions[i].z(), heights[i], 1e-5) << i;
+  for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(grid.vertex(i).z(), heights[i], 1e-5) << i;
+}
+
+// 513 x 257 of 16 bits, about a place of its own: each pixel is where SDF says.
+TEST(MadeMeshes, HeightmapsNeedNotBeSquare) {
+  const TemporaryFolder folder;
+  cv::Mat numbers(257, 513, CV_16U);
+  const auto number = [](int row, int column) { return (7919 * row + 104729 * column) % 65536; };
+  for (int row = 0; row < 257; ++row)
+    for (int column = 0; column < 513; ++column)
+      numbers.at<uint16_t>(row, column) = static_cast<uint16_t>(number(row, column));
+  std::vector<uint8_t> bytes;
+  encode_picture(".png", numbers, bytes, {});
+  const HeightGrid grid = heightmap(folder.write("a.png", std::string(bytes.begin(), bytes.end())),
+                                    {51.2, 25.6, 10}, {3, 4, -5});
+  ASSERT_EQ(grid.columns(), 513u);
+  ASSERT_EQ(grid.rows(), 257u);
+  for (int row = 0; row < 257; row += 16) {
+    for (int column = 0; column < 513; column += 19) {
+      const Vec3 expected(-25.6 + 0.1 * column + 3, 12.8 - 0.1 * row + 4,
+                          number(row, column) / 65535.0 * 10 - 5);
+      EXPECT_LT((grid.vertex(row, column).cast<double>() - expected).norm(), 1e-5);
+    }
+  }
 }
 
 // A few bytes that announce gigabytes: the header is checked before anything is decoded.

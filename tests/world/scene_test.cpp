@@ -7,6 +7,7 @@
 
 #include "temporary_folder.h"
 #include "text_world.h"
+#include "world/model/height_grid.h"
 
 namespace ruedo::world {
 namespace {
@@ -134,11 +135,11 @@ TEST(Scene, HeightmapsStandAtTheirPlaces) {
   ASSERT_TRUE(hill.mesh);
   Eigen::AlignedBox3d box;
   Vec3 top = Vec3::Zero();
-  for (const Eigen::Vector3f& p : hill.mesh->positions) {
+  for_each_vertex(*hill.mesh, [&](const Eigen::Vector3f& p) {
     const Vec3 p_L = link.collisions[0].X_LC * Vec3(p.cast<double>().cwiseProduct(hill.scale));
     box.extend(p_L);
     if (p_L.z() > top.z()) top = p_L;
-  }
+  });
   EXPECT_LT((box.min() - Vec3(-1, -2, 0)).norm(), 1e-6);
   EXPECT_LT((box.max() - Vec3(3, 2, 2)).norm(), 1e-6);
   EXPECT_LT((top - Vec3(1, 0, 2)).norm(), 1e-6);
@@ -168,7 +169,7 @@ TEST(Scene, HeightmapsAreCoveredByTheirFirstTexture) {
   ASSERT_EQ(mesh.materials.size(), 1u);
   EXPECT_EQ(mesh.materials[0].texture->path, grass);
   EXPECT_EQ(mesh.parts.at(0).material, 0);
-  EXPECT_EQ(mesh.uvs.at(1), Eigen::Vector2f(2, 2));  // the far right corner
+  EXPECT_EQ(height_map(mesh)->tiles, Eigen::Vector2f(2, 2));
   EXPECT_THAT(texts(*heightmap(texture + texture)),
               testing::ElementsAre(testing::HasSubstr("not blended in")));
   EXPECT_THAT(texts(*heightmap("<texture><diffuse>none.ppm</diffuse></texture>")),

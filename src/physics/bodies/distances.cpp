@@ -11,6 +11,7 @@
 
 #include "physics/bodies/rigid_bodies.h"
 #include "physics/collision/closest_points.h"
+#include "physics/collision/mesh_edges.h"
 #include "physics/collision/shapes.h"
 
 namespace ruedo::physics {
@@ -272,7 +273,7 @@ class Distances::Impl::Triangles final : public btTriangleCallback {
 
   void measure() {
     const Vec3 reach = Vec3::Constant(impl_.best_m_);
-    static_cast<const btBvhTriangleMeshShape&>(*mesh_.shape)
+    static_cast<const btConcaveShape&>(*mesh_.shape)
         .processAllTriangles(this, to_bt(Vec3(box_.low - reach)), to_bt(Vec3(box_.high + reach)));
   }
 
@@ -310,8 +311,7 @@ class Distances::Impl::Triangles final : public btTriangleCallback {
 
 void Distances::Impl::measure(const Piece& own, const Piece& other) {
   if (other.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) return measure_plane(own, other);
-  if (other.shape->getShapeType() == TRIANGLE_MESH_SHAPE_PROXYTYPE)
-    return Triangles(*this, own, other).measure();
+  if (has_triangles(*other.shape)) return Triangles(*this, own, other).measure();
   const PlacedShape a{own.convex(), own.X_WS}, b{other.convex(), other.X_WS};
   const ClosestPoints gap = closest_points(a, b, best_m_);
   if (gap.distance > best_m_) return;

@@ -15,13 +15,13 @@ constexpr double kLean = 2e-3;
 
 }  // namespace
 
-MeshEdges::MeshEdges(const world::Mesh& mesh, const Vec3& scale) {
+TriangleEdges::TriangleEdges(const world::Mesh& mesh, const Vec3& scale) {
   join_vertices(mesh, scale);
   find_neighbours();
   find_rings();
 }
 
-void MeshEdges::join_vertices(const world::Mesh& mesh, const Vec3& scale) {
+void TriangleEdges::join_vertices(const world::Mesh& mesh, const Vec3& scale) {
   const auto key = [&](uint32_t i) {
     return std::tuple(mesh.positions[i].x(), mesh.positions[i].y(), mesh.positions[i].z());
   };
@@ -38,7 +38,7 @@ void MeshEdges::join_vertices(const world::Mesh& mesh, const Vec3& scale) {
     triangles_.push_back({joined[t[0]], joined[t[1]], joined[t[2]]});
 }
 
-void MeshEdges::find_neighbours() {
+void TriangleEdges::find_neighbours() {
   neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   struct Side {
     uint32_t low, high;
@@ -64,7 +64,7 @@ void MeshEdges::find_neighbours() {
   }
 }
 
-void MeshEdges::find_rings() {
+void TriangleEdges::find_rings() {
   std::vector<std::pair<uint32_t, uint32_t>> spokes;
   for (const auto& t : triangles_) {
     for (size_t i = 0; i < 3; ++i) {
@@ -82,46 +82,55 @@ void MeshEdges::find_rings() {
   std::partial_sum(first_in_ring_.begin(), first_in_ring_.end(), first_in_ring_.begin());
 }
 
+bool TriangleEdges::any_around(uint32_t vertex, const std::function<bool(uint32_t)>& found) const {
+  return std::any_of(ring_.begin() + static_cast<long>(first_in_ring_[vertex]),
+                     ring_.begin() + static_cast<long>(first_in_ring_[vertex + 1]), found);
+}
+
 bool MeshEdges::belongs_elsewhere(int triangle, const Vec3& point, const Vec3& normal) const {
-  if (triangle < 0 || static_cast<size_t>(triangle) >= triangles_.size()) return false;
-  const auto& t = triangles_[triangle];
+  if (triangle < 0 || static_cast<size_t>(triangle) >= triangle_count()) return false;
+  const auto t = corners(triangle);
+  const std::array<Vec3, 3> at{vertex(t[0]), vertex(t[1]), vertex(t[2])};
   const auto leads_there = [&](const Vec3& direction) {
     return normal.dot(direction) > kLean * direction.norm();
   };
-  int on_edges = 0, edge = kNone;
+  int on_edges = 0;
+  size_t edge = 0;
   std::array<bool, 3> on{};
   for (size_t i = 0; i < 3; ++i) {
-    const Vec3 &a = vertices_[t[i]], &b = vertices_[t[(i + 1) % 3]], &c = vertices_[t[(i + 2) % 3]];
+    const Vec3 &a = at[i], &b = at[(i + 1) % 3], &c = at[(i + 2) % 3];
     const Vec3 along = (b - a).normalized();
     const Vec3 inward = c - a - along * along.dot(c - a);
     on[i] = (point - a).dot(inward) < kOnEdge * inward.squaredNorm();
     if (!on[i]) continue;
     ++on_edges;
-    edge = static_cast<int>(i);
+    edge = i;
   }
   if (on_edges == 0) return false;
   if (on_edges >= 2) {  // a vertex: any edge from it that comes nearer decides
-    const uint32_t corner = on[0] && on[1] ? t[1] : on[1] && on[2] ? t[2] : t[0];
-    for (size_t k = first_in_ring_[corner]; k < first_in_ring_[corner + 1]; ++k) {
-      if (leads_there(vertices_[ring_[k]] - vertices_[corner])) return true;
-    }
-    return false;
+    const size_t corner = on[0] && on[1] ? 1 : on[1] && on[2] ? 2 : 0;
+    const auto nearer = [&](uint32_t next) { return leads_there(vertex(next) - at[corner]); };
+    return any_around(t[corner], std::cref(nearer));  // a reference: nothing is allocated
   }
-  const int other = neighbours_[triangle][edge];
+  const int other = neighbour(triangle, edge);
   if (other == kNone) return false;
-  const uint32_t from = t[edge], to = t[static_cast<size_t>(edge + 1) % 3];
-  const auto& n = triangles_[other];
+  const size_t end = (edge + 1) % 3;
+  const uint32_t from = t[edge], to = t[end];
+  const auto n = corners(other);
   const auto third =
       std::find_if(n.begin(), n.end(), [&](uint32_t v) { return v != from && v != to; });
   if (third == n.end()) return false;
-  const Vec3 along = (vertices_[to] - vertices_[from]).normalized(),
-             across = vertices_[*third] - vertices_[from];
+  const Vec3 along = (at[end] - at[edge]).normalized(), across = vertex(*third) - at[edge];
   return leads_there(across - along * along.dot(across));
 }
 
+bool has_triangles(const btCollisionShape& shape) {
+  return shape.getShapeType() == TRIANGLE_MESH_SHAPE_PROXYTYPE ||
+         shape.getShapeType() == TERRAIN_SHAPE_PROXYTYPE;
+}
+
 bool is_mesh(const btCollisionObject& object) {
-  return object.getCollisionShape()->getShapeType() == TRIANGLE_MESH_SHAPE_PROXYTYPE &&
-         object.getCollisionShape()->getUserPointer();
+  return has_triangles(*object.getCollisionShape()) && object.getCollisionShape()->getUserPointer();
 }
 
 MeshContacts::MeshContacts(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "physics/base/bullet.h"
@@ -17,14 +18,35 @@ namespace ruedo::physics {
 
 class MeshEdges {
  public:
-  MeshEdges(const world::Mesh& mesh, const Vec3& scale);
+  virtual ~MeshEdges() = default;
 
   // Whether another part of the mesh is nearer to something in the direction of `normal` (unit)
   // from `point` on that triangle. Both in the mesh's frame, scaled.
   bool belongs_elsewhere(int triangle, const Vec3& point, const Vec3& normal) const;
 
- private:
+ protected:
   static constexpr int kNone = -1;  // no other triangle has that edge, or several do
+
+ private:
+  virtual size_t triangle_count() const = 0;
+  virtual std::array<uint32_t, 3> corners(int triangle) const = 0;  // vertices, counter-clockwise
+  virtual Vec3 vertex(uint32_t index) const = 0;
+  // The triangle across the edge from corner `edge` to the next.
+  virtual int neighbour(int triangle, size_t edge) const = 0;
+  // Whether an edge from the vertex leads to one of which found() is true.
+  virtual bool any_around(uint32_t vertex, const std::function<bool(uint32_t)>& found) const = 0;
+};
+
+class TriangleEdges final : public MeshEdges {
+ public:
+  TriangleEdges(const world::Mesh& mesh, const Vec3& scale);
+
+ private:
+  size_t triangle_count() const override { return triangles_.size(); }
+  std::array<uint32_t, 3> corners(int triangle) const override { return triangles_[triangle]; }
+  Vec3 vertex(uint32_t index) const override { return vertices_[index]; }
+  int neighbour(int triangle, size_t edge) const override { return neighbours_[triangle][edge]; }
+  bool any_around(uint32_t vertex, const std::function<bool(uint32_t)>& found) const override;
 
   void join_vertices(const world::Mesh& mesh, const Vec3& scale);
   void find_neighbours();
@@ -37,6 +59,7 @@ class MeshEdges {
   std::vector<uint32_t> ring_;                  // vertices connected by an edge
 };
 
+bool has_triangles(const btCollisionShape& shape);  // a static mesh, or a height map
 bool is_mesh(const btCollisionObject& object);
 
 // Of a pair with a static mesh.

@@ -11,6 +11,7 @@
 #include <LinearMath/btConvexHullComputer.h>
 
 #include "physics/collision/convex_shapes.h"
+#include "physics/collision/height_field.h"
 #include "physics/collision/mesh_edges.h"
 #include "ruedo/math.h"
 
@@ -124,7 +125,7 @@ struct ShapeFactory::Triangles {
   std::vector<double> positions;
   std::vector<int> indices;
   btTriangleIndexVertexArray array;
-  MeshEdges edges;
+  TriangleEdges edges;
 
   Triangles(const world::Mesh& mesh, const Vec3& scale) : edges(mesh, scale) {
     for (const auto& p : mesh.positions) {
@@ -180,15 +181,18 @@ btCollisionShape* ShapeFactory::primitive(const world::Geometry& geometry) {
 
 btCollisionShape* ShapeFactory::fixed(const world::Geometry& geometry) {
   if (geometry.shape != world::Shape::mesh) return primitive(geometry);
-  if (!geometry.mesh || geometry.mesh->triangles.empty()) return nullptr;
+  if (!geometry.mesh || world::triangle_count(*geometry.mesh) == 0) return nullptr;
   const Vec3& scale = geometry.scale;
   btCollisionShape*& shape = fixed_meshes_[{geometry.mesh.get(), scale.x(), scale.y(), scale.z()}];
-  if (!shape) {
+  const world::HeightMap* heights = world::height_map(*geometry.mesh);
+  if (!shape && heights) {
+    shape = own(std::make_unique<SeenAhead<HeightField>>(heights->grid));
+  } else if (!shape) {
     triangles_.push_back(std::make_unique<Triangles>(*geometry.mesh, scale));
     auto mesh = std::make_unique<SeenAhead<btBvhTriangleMeshShape>>(&triangles_.back()->array,
                                                                     /*quantised*/ false);
     mesh->setMargin(0.0);
-    mesh->setUserPointer(&triangles_.back()->edges);
+    mesh->setUserPointer(static_cast<MeshEdges*>(&triangles_.back()->edges));
     shape = own(std::move(mesh));
   }
   return shape;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "world/model/bounds.h"
+#include "world/model/height_grid.h"
 
 namespace ruedo::scene {
 namespace {
@@ -60,7 +61,7 @@ Area area_of(const world::Visual& visual, const Pose& X_WV, double height) {
   const Box box = placed(visual.geometry, X_WV);
   if (box.isEmpty()) return area;
   const world::Geometry& g = visual.geometry;
-  if (g.shape != world::Shape::mesh) {
+  if (g.shape != world::Shape::mesh || world::grid_of(*g.mesh)) {
     (box.min().z() > height ? area.above : area.below) = box.sizes().x() * box.sizes().y();
     return area;
   }
@@ -99,7 +100,8 @@ void cut(world::Link& link, const Pose& X_WL, double height) {
     const Pose X_WV = X_WL * visual.X_LV;
     const Box box = placed(visual.geometry, X_WV);
     if (!box.isEmpty() && box.min().z() > height) continue;
-    if (!box.isEmpty() && box.max().z() > height && visual.geometry.shape == world::Shape::mesh)
+    if (!box.isEmpty() && box.max().z() > height && visual.geometry.shape == world::Shape::mesh &&
+        !world::grid_of(*visual.geometry.mesh))
       visual.geometry.mesh = cut(visual.geometry, X_WV, height);
     kept.push_back(std::move(visual));
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ruedo/math.h"
+#include "world/model/height_grid.h"
 
 namespace ruedo::scene {
 namespace {
@@ -202,7 +203,65 @@ void cut(const world::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin
 
 }  // namespace
 
+namespace {
+
+// Every how-manieth height is drawn, with the last one: the picture of a map is bounded.
+std::vector<size_t> drawn(size_t heights, size_t step) {
+  std::vector<size_t> some;
+  for (size_t i = 0; i + 1 < heights; i += step) some.push_back(i);
+  some.push_back(heights - 1);
+  return some;
+}
+
+// Smooth. Of more than 1025 heights in a direction every second, third, ... is drawn, so that this
+// many are enough: two million triangles.
+RenderMesh grid_mesh(const world::HeightMap& map) {
+  constexpr size_t kMostCells = 1024, kCellsOfPiece = 44;
+  static_assert(2 * kCellsOfPiece * kCellsOfPiece <= kPieceTriangles);
+  const world::HeightGrid& grid = *map.grid;
+  const size_t step = (std::max(grid.rows(), grid.columns()) - 2) / kMostCells + 1;
+  const std::vector<size_t> rows = drawn(grid.rows(), step), columns = drawn(grid.columns(), step);
+  const size_t count = columns.size();
+  RenderMesh out;
+  out.vertices.reserve(rows.size() * count);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const size_t up = rows[i ? i - 1 : 0], down = rows[std::min(i + 1, rows.size() - 1)];
+    for (size_t k = 0; k < count; ++k) {
+      const size_t row = rows[i], column = columns[k], left = columns[k ? k - 1 : 0],
+                   right = columns[std::min(k + 1, count - 1)];
+      const Vector3f along_x = grid.vertex(row, right) - grid.vertex(row, left),
+                     along_y = grid.vertex(up, column) - grid.vertex(down, column);
+      const Vector2f uv =
+          Eigen::Vector2d(static_cast<double>(column) / static_cast<double>(grid.columns() - 1),
+                          1.0 - static_cast<double>(row) / static_cast<double>(grid.rows() - 1))
+              .cast<float>();
+      out.vertices.push_back({grid.vertex(row, column), along_x.cross(along_y).normalized(),
+                              uv.cwiseProduct(map.tiles)});
+    }
+  }
+  for (size_t i0 = 0; i0 + 1 < rows.size(); i0 += kCellsOfPiece) {
+    for (size_t k0 = 0; k0 + 1 < count; k0 += kCellsOfPiece) {
+      RenderMesh::Piece piece;
+      piece.first_index = static_cast<uint32_t>(out.indices.size());
+      for (size_t i = i0; i < std::min(i0 + kCellsOfPiece, rows.size() - 1); ++i) {
+        for (size_t k = k0; k < std::min(k0 + kCellsOfPiece, count - 1); ++k) {
+          const auto a = static_cast<uint32_t>(i * count + k), c = a + static_cast<uint32_t>(count);
+          out.indices.insert(out.indices.end(), {a, c, a + 1, a + 1, c, c + 1});
+        }
+      }
+      piece.index_count = static_cast<uint32_t>(out.indices.size()) - piece.first_index;
+      piece.material = map.parts[0].material;
+      bound(out, piece);
+      out.pieces.push_back(piece);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 RenderMesh file_mesh(const world::Mesh& mesh) {
+  if (const world::HeightMap* map = world::height_map(mesh)) return grid_mesh(*map);
   const size_t count = mesh.positions.size();
   const bool smooth = mesh.normals.size() == count;
   const bool mapped = mesh.uvs.size() == count;

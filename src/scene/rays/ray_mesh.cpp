@@ -113,7 +113,7 @@ void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_m
 }
 
 int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
-  const Seen s = seen(triangle, o, shear);
+  const SeenTriangle s = seen(triangle, o, shear);
   const auto sign = [](double edge, double dy,
                        double dx) {  // ties are broken as if the ray were displaced by (e, e^2)
     const double first = edge != 0.0 ? edge : dy != 0.0 ? dy : dx;

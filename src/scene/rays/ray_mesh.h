@@ -34,6 +34,33 @@ struct Shear {
   }
 };
 
+// A triangle in the ray's sheared coordinates: vertices across and along the ray, and the edge
+// functions.
+struct SeenTriangle {
+  double ax, ay, az, bx, by, bz, cx, cy, cz, u, v, w;
+  SeenTriangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& o, const Shear& s) {
+    const auto see = [&](const Vec3& p, double& x, double& y, double& z) {
+      z = p[s.kz] - o[s.kz];
+      x = (p[s.kx] - o[s.kx]) - s.sx * z;
+      y = (p[s.ky] - o[s.ky]) - s.sy * z;
+    };
+    see(a, ax, ay, az);
+    see(b, bx, by, bz);
+    see(c, cx, cy, cz);
+    u = cx * by - cy * bx;
+    v = ax * cy - ay * cx;
+    w = bx * ay - by * ax;
+  }
+  double t(const Shear& s) const { return s.sz * ((u * az + v * bz + w * cz) / (u + v + w)); }
+  // The distance of the hit; kNoHit if the ray misses, sees it edge-on, or it is degenerate.
+  double hit(const Shear& s) const {
+    if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) return kNoHit;
+    if (u + v + w == 0.0) return kNoHit;
+    const double distance = t(s);
+    return distance >= 0.0 ? distance : kNoHit;
+  }
+};
+
 // Eight rays in some frame; the shears are used by meshes only.
 struct FrameRays {
   Vec3 o[kLanes], d[kLanes];
@@ -76,27 +103,8 @@ class RayMesh {
 
  private:
   struct Query;
-  // A triangle in the ray's sheared coordinates: vertices across and along the ray, and the edge
-  // functions.
-  struct Seen {
-    double ax, ay, az, bx, by, bz, cx, cy, cz, u, v, w;
-    Seen(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& o, const Shear& s) {
-      const auto see = [&](const Vec3& p, double& x, double& y, double& z) {
-        z = p[s.kz] - o[s.kz];
-        x = (p[s.kx] - o[s.kx]) - s.sx * z;
-        y = (p[s.ky] - o[s.ky]) - s.sy * z;
-      };
-      see(a, ax, ay, az);
-      see(b, bx, by, bz);
-      see(c, cx, cy, cz);
-      u = cx * by - cy * bx;
-      v = ax * cy - ay * cx;
-      w = bx * ay - by * ax;
-    }
-    double t(const Shear& s) const { return s.sz * ((u * az + v * bz + w * cz) / (u + v + w)); }
-  };
   const Vec3& corner(int triangle, int i) const { return positions_[triangles_[triangle][i]]; }
-  Seen seen(int triangle, const Vec3& o, const Shear& shear) const {
+  SeenTriangle seen(int triangle, const Vec3& o, const Shear& shear) const {
     return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o, shear};
   }
   static void bounds(const RTCBoundsFunctionArguments* arguments);
@@ -115,11 +123,8 @@ template <class Found>
 inline void RayMesh::test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const {
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
-    const Seen s = seen(triangle, rays.o[lane], rays.shear[lane]);
-    if ((s.u < 0.0 || s.v < 0.0 || s.w < 0.0) && (s.u > 0.0 || s.v > 0.0 || s.w > 0.0)) continue;
-    if (s.u + s.v + s.w == 0.0) continue;  // edge-on, or degenerate
-    const double t = s.t(rays.shear[lane]);
-    if (t >= 0.0) found(lane, t);
+    const double t = seen(triangle, rays.o[lane], rays.shear[lane]).hit(rays.shear[lane]);
+    if (t < kNoHit) found(lane, t);
   }
 }
 

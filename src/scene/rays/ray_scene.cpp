@@ -197,7 +197,7 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     return;
   }
   if (shape.kind == world::Shape::mesh && !shape.body.valid()) {  // in the world's frame
-    const Vec3 normal = shape.mesh->normal(batch.feature[lane]);
+    const Vec3 normal = shape_normal(shape, batch.feature[lane], Vec3::Zero());
     hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
     return;
   }

@@ -17,7 +17,7 @@ StaticRayScene::StaticRayScene(const world::WorldModel& world, const world::Body
     const RayShape& s = shape(index);
     if (!fits_tree(s.box_F)) {
       unbounded_.push_back(index);
-    } else if (s.kind == Shape::mesh) {
+    } else if (s.mesh) {
       meshes.emplace_back(index, &s);
       if (s.mesh->closed()) {
         closed_.push_back(index);

@@ -62,7 +62,13 @@ Vec3 size_of(const world::Geometry& geometry) {
 
 // Computes the box and bounding sphere of the shape in its current place.
 void enclose(RayShape& shape, const Pose& X_FS) {
-  if (shape.kind == Shape::mesh) {
+  if (shape.grid) {
+    const Box& box = shape.grid->box();
+    for (int i = 0; i < 8; ++i)
+      shape.box_F.add(X_FS * Vec3((i & 1 ? box.lower : box.upper).x(),
+                                  (i & 2 ? box.lower : box.upper).y(),
+                                  (i & 4 ? box.lower : box.upper).z()));
+  } else if (shape.kind == Shape::mesh) {
     for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
   } else if (shape.kind != Shape::plane) {
     const Vec3 half = shape.into.rotation.transpose().cwiseAbs() * half_box(shape);
@@ -136,7 +142,7 @@ void RayTable::add(const world::LinkPlacement& link, LinkIndex link_index, Shape
                    const Pose& X_LShape, const world::Geometry& geometry,
                    const world::BodyLayout& layout, bool visuals, RTCDevice device) {
   const bool is_mesh = geometry.shape == Shape::mesh;
-  if (is_mesh && (!geometry.mesh || geometry.mesh->triangles.empty())) return;
+  if (is_mesh && (!geometry.mesh || world::triangle_count(*geometry.mesh) == 0)) return;
   RayShape shape;
   Pose X_LS = X_LShape;
   shape.kind = geometry.shape;
@@ -155,7 +161,10 @@ void RayTable::add(const world::LinkPlacement& link, LinkIndex link_index, Shape
   Pose X_FS = (link.X_BL * X_LS).normalized();
   if (is_mesh) {
     const bool is_static = !link.body.valid();
-    shape.mesh = mesh_of(geometry, is_static ? &X_FS : nullptr, device);
+    if (const world::HeightMap* heights = world::height_map(*geometry.mesh))
+      shape.grid = std::make_shared<const RayGrid>(heights->grid, is_static ? X_FS : Pose());
+    else
+      shape.mesh = mesh_of(geometry, is_static ? &X_FS : nullptr, device);
     if (is_static) X_FS = Pose();  // given in the world's frame already
   }
   shape.into = IntoShape(X_FS);
@@ -196,14 +205,17 @@ void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned
     const int lane = std::countr_zero(rest);
     local.o[lane] = into.point(rays.o[lane]);
     local.d[lane] = into.vector(rays.d[lane]);
-    if (batch.inside_mesh(shape, index, rays.o[lane], local.o[lane]))
+    if (shape.mesh && batch.inside_mesh(shape, index, rays.o[lane], local.o[lane]))
       batch.offer(lane, {0.0, kInside}, index);
     else
       outside |= 1u << lane;
     local.shear[lane] = Shear(local.d[lane]);
   }
   ShapeHit hits[kLanes];
-  shape.mesh->intersect(outside, local, batch.t, hits);
+  if (shape.grid)
+    shape.grid->intersect(outside, local, batch.t, hits);
+  else
+    shape.mesh->intersect(outside, local, batch.t, hits);
   for (unsigned rest = outside; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     batch.offer(lane, hits[lane], index);
@@ -258,7 +270,7 @@ Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p) {
       return Vec3(p.x() / around * 2.0 * s.y(), p.y() / around * 2.0 * s.y(), s.x()).normalized();
     }
     case Shape::plane: return shape.normal;
-    case Shape::mesh: return shape.mesh->normal(feature);
+    case Shape::mesh: return shape.grid ? shape.grid->normal(feature) : shape.mesh->normal(feature);
   }
   return Vec3::UnitZ();
 }

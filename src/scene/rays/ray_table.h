@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "scene/rays/ray_grid.h"
 #include "scene/rays/ray_mesh.h"
 #include "world/model/body_layout.h"
 
@@ -41,7 +42,8 @@ struct RayShape {
   Vec3 size = Vec3::Zero();     // box: half lengths; sphere, cylinder, capsule, cone: radius, half
                                 // length; ellipsoid: radii
   Vec3 normal = Vec3::UnitZ();  // plane
-  std::shared_ptr<const RayMesh> mesh;
+  std::shared_ptr<const RayMesh> mesh;  // of a mesh: this, or a height map
+  std::shared_ptr<const RayGrid> grid;
   Box box_F;                     // bounds at every wheel angle; empty for a plane
   Vec3 center_F = Vec3::Zero();  // bounding sphere, likewise
   double radius = 0.0;

@@ -16,6 +16,7 @@
 #include "ruedo/math.h"
 #include "world/model/bounds.h"
 #include "world/model/convex.h"
+#include "world/model/height_grid.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {
@@ -82,10 +83,11 @@ struct Cells {
   }
 };
 
-// The triangles of a mesh, by the column of the world in which they are.
+// The triangles of a mesh, by the column of the world in which they are. A height map has them so.
 class TriangleGrid {
  public:
-  TriangleGrid(const Geometry& g, const Pose& X_WG) {
+  TriangleGrid(const Geometry& g, const Pose& X_WG) : heights_(grid_of(*g.mesh)), X_WG_(X_WG) {
+    if (heights_) return;
     std::vector<Vec3> points;
     points.reserve(g.mesh->positions.size());
     for (const auto& p : g.mesh->positions) {
@@ -112,6 +114,7 @@ class TriangleGrid {
   // true.
   template <class Visit>
   bool any(const Box& box, Visit visit) {
+    if (heights_) return any_height(box, visit);
     bool found = false;
     const auto visit_each = [&](const std::vector<uint32_t>& some) {
       for (size_t i = 0; i < some.size() && !found; ++i) found = visit(triangles_[some[i]]);
@@ -122,6 +125,22 @@ class TriangleGrid {
   }
 
  private:
+  template <class Visit>
+  bool any_height(const Box& box, Visit visit) {
+    const Box box_G = placed(box, X_WG_.inverse());
+    const HeightGrid::Cells cells =
+        heights_->cells(box_G.min().x(), box_G.max().x(), box_G.min().y(), box_G.max().y());
+    for (size_t row = cells.row; row < cells.row_end; ++row) {
+      for (size_t column = cells.column; column < cells.column_end; ++column) {
+        const auto corner = [&](size_t down, size_t right) -> Vec3 {
+          return X_WG_ * Vec3(heights_->vertex(row + down, column + right).cast<double>());
+        };
+        const Vec3 a = corner(0, 0), b = corner(0, 1), c = corner(1, 0), d = corner(1, 1);
+        if (visit(std::array{a, c, b}) || visit(std::array{b, c, d})) return true;
+      }
+    }
+    return false;
+  }
   Cells cells_of(const Box& box) const {
     const auto cell = [&](double at, int axis) {
       const double size = std::max(box_.sizes()[axis], 1e-9);
@@ -131,6 +150,8 @@ class TriangleGrid {
             cell(box.max().y(), 1)};
   }
 
+  const HeightGrid* heights_;  // null: the triangles are below
+  Pose X_WG_;
   Box box_;
   int side_ = 1;
   std::vector<std::array<Vec3, 3>> triangles_;

@@ -12,6 +12,7 @@
 #include "ruedo/math.h"
 #include "world/model/bounds.h"
 #include "world/model/convex.h"
+#include "world/model/height_grid.h"
 #include "world/read/read_context.h"
 
 namespace ruedo::world {
@@ -86,13 +87,13 @@ class Cut {
       shapes_.push_back({{&g, X_WG, {}}, box});
       return;
     }
-    for (const auto& t : g.mesh->triangles) {
+    for_each_triangle(*g.mesh, [&](const std::array<Eigen::Vector3f, 3>& own) {
       std::array<Vec3, 3> corners;
       for (size_t k = 0; k < 3; ++k)
-        corners[k] = X_WG * g.scale.cwiseProduct(g.mesh->positions[t[k]].cast<double>());
+        corners[k] = X_WG * g.scale.cwiseProduct(own[k].cast<double>());
       const auto [low, high] = std::minmax({corners[0].z(), corners[1].z(), corners[2].z()});
       if (low <= height_ && height_ <= high) triangles_.push_back(corners);
-    }
+    });
   }
 
   Box bounds_of(const OccupancyGrid& grid) const {

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "ruedo/math.h"
+#include "world/model/height_grid.h"
 
 namespace ruedo::world {
 namespace {
@@ -32,10 +33,10 @@ Vec3 support_in_shape(const Geometry& g, const Vec3& d) {
     case Shape::mesh: {
       Vec3 best = Vec3::Zero();
       double most = -std::numeric_limits<double>::infinity();
-      for (const auto& p : g.mesh->positions) {
+      for_each_vertex(*g.mesh, [&](const Eigen::Vector3f& p) {
         const Vec3 point = g.scale.cwiseProduct(p.cast<double>());
         if (const double along = point.dot(d); along > most) most = along, best = point;
-      }
+      });
       return best;
     }
     case Shape::plane: break;

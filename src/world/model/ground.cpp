@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "ruedo/math.h"
+#include "world/model/height_grid.h"
 
 namespace ruedo::world {
 
@@ -73,9 +74,9 @@ double lowest_point(const Geometry& geometry, const Pose& X_FC) {
     case Shape::mesh:
       reach = -std::numeric_limits<double>::infinity();
       if (!geometry.mesh) break;
-      for (const auto& position : geometry.mesh->positions) {
+      for_each_vertex(*geometry.mesh, [&](const Eigen::Vector3f& position) {
         reach = std::max(reach, down.dot(position.cast<double>().cwiseProduct(geometry.scale)));
-      }
+      });
       break;
   }
   return X_FC.translation.z() - reach;

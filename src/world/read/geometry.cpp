@@ -3,6 +3,7 @@
 
 #include "base/text.h"
 #include "world/model/bounds.h"
+#include "world/read/height_maps.h"
 
 #include <stdexcept>
 
@@ -42,7 +43,7 @@ void divide(Geometry& geometry, size_t most, const Element& element, const std::
 }
 
 std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
-                                  ReadContext& context, bool collides_moving) {
+                                  ReadContext& context, ShapeUse use) {
   report_other_children(mesh, {"uri", "scale", "submesh", "convex_decomposition"}, {}, where,
                         context.findings);
   const size_t most = most_pieces(mesh, where, context);
@@ -79,13 +80,13 @@ std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
         "the mesh '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
     return std::nullopt;
   }
-  if (collides_moving) divide(geometry, most, mesh, where, context);
+  if (use == ShapeUse::collides_moving) divide(geometry, most, mesh, where, context);
   return geometry;
 }
 
 std::optional<Geometry> read_polyline(const Element& geometry_element, const Element& first,
                                       const std::string& where, ReadContext& context,
-                                      bool collides_moving) {
+                                      ShapeUse use) {
   std::vector<std::vector<Eigen::Vector2d>> polygons;
   for (const Element* polyline : geometry_element.all("polyline")) {
     std::vector<Eigen::Vector2d> polygon;
@@ -105,7 +106,7 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
     Geometry geometry;
     geometry.shape = Shape::mesh;
     geometry.mesh = std::move(mesh);
-    if (collides_moving) divide(geometry, kMostPieces, first, where, context);
+    if (use == ShapeUse::collides_moving) divide(geometry, kMostPieces, first, where, context);
     return geometry;
   } catch (const EnvironmentError&) {
     throw;
@@ -119,7 +120,7 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
 
 // The first <texture>'s diffuse picture, tiled over the ground. Gazebo blends in further ones by
 // height; these are reported.
-void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
+void cover_with_texture(const Element& element, const Vec3& size, HeightMap& mesh,
                         const std::string& where, ReadContext& context) {
   const Element* texture = element.child("texture");
   const Element* picture = texture ? texture->child("diffuse") : nullptr;
@@ -144,12 +145,43 @@ void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
   if (!ground.texture) return;
   mesh.materials.push_back(std::move(ground));
   for (Mesh::Part& part : mesh.parts) part.material = MaterialIndex(0);
-  const Eigen::Vector2f tiles = (size.head<2>() / tile_m).cast<float>();
-  for (Eigen::Vector2f& uv : mesh.uvs) uv = uv.cwiseProduct(tiles);
+  mesh.tiles = (size.head<2>() / tile_m).cast<float>();
+}
+
+// Throws std::runtime_error that says what is wrong with the picture.
+std::shared_ptr<const HeightGrid> read_heights(const Element& element, const std::string& uri,
+                                               const Vec3& size, ReadContext& context) {
+  const auto path = context.resources.find(uri, element.source.file);
+  if (!path) throw std::runtime_error(context.resources.why_not(uri, element.source.file));
+  context.documents.note(*path);
+  const Vec3 at = element.vector3("pos", Vec3::Zero(), Allowed::any(quantity::kLength));
+  try {
+    return height_map_of(*path, size, at);
+  } catch (const EnvironmentError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string("cannot be used: ") + error.what());
+  }
+}
+
+// A moving one collides as its hull, like a mesh.
+std::shared_ptr<Mesh> mesh_of(std::shared_ptr<const HeightGrid> grid, ShapeUse use) {
+  if (use == ShapeUse::collides_moving) {
+    if (std::max(grid->columns(), grid->rows()) > kMostHeightsOfMoving)
+      throw std::runtime_error("cannot be used: it has " + std::to_string(grid->columns()) + " x " +
+                               std::to_string(grid->rows()) + " pixels; one that moves has up to " +
+                               std::to_string(kMostHeightsOfMoving) + " each way");
+    return std::make_shared<Mesh>(triangles_of(*grid));
+  }
+  auto map = std::make_shared<HeightMap>();
+  const auto triangles = static_cast<uint32_t>(grid->triangle_count());
+  map->parts.push_back({kHeightMapPart, 0, triangles, {}});
+  map->grid = std::move(grid);
+  return map;
 }
 
 std::optional<Geometry> read_heightmap(const Element& element, const std::string& where,
-                                       ReadContext& context) {
+                                       ReadContext& context, ShapeUse use) {
   report_other_children(element, {"uri", "size", "pos", "texture"},
                         {"use_terrain_paging", "sampling", "blend"}, where, context.findings);
   const std::string uri = element.string("uri", "");
@@ -158,32 +190,32 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
   if (size.minCoeff() <= 0)
     element.child("size")->fail("'" + element.child("size")->text +
                                 "' is not allowed; sizes are above 0");
-  const auto path = context.resources.find(uri, element.source.file);
-  if (!path) {
-    context.findings.error(element.source, where,
-                           "the heightmap '" + uri + "' " +
-                               context.resources.why_not(uri, element.source.file) +
-                               "; the shape is left out");
-    return std::nullopt;
-  }
-  context.documents.note(*path);
-  auto mesh = std::make_shared<Mesh>();
+  std::shared_ptr<Mesh> mesh;
   try {
-    *mesh = heightmap(*path, size);
+    mesh = mesh_of(read_heights(element, uri, size, context), use);
+  } catch (const EnvironmentError&) {
+    throw;
   } catch (const std::runtime_error& error) {
-    context.findings.error(
-        element.source, where,
-        "the heightmap '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
-    return std::nullopt;
+    element.fail("the heightmap '" + uri + "' " + error.what());
   }
-  cover_with_texture(element, size, *mesh, where, context);
-  const Vec3 at = element.vector3("pos", Vec3::Zero(), Allowed::any(quantity::kLength));
-  for (auto& p : mesh->positions) p += at.cast<float>();
-  mesh->name = *path;
+  if (use == ShapeUse::seen)
+    cover_with_texture(element, size, static_cast<HeightMap&>(*mesh), where, context);
+  mesh->name = context.resources.find(uri, element.source.file).value_or(uri);
   Geometry geometry;
   geometry.shape = Shape::mesh;
   geometry.mesh = std::move(mesh);
   return geometry;
+}
+
+// A heightmap that collides is the ground: without it, a world is another.
+template <class Read>
+std::optional<Geometry> read_ground(ShapeUse use, Read read) {
+  try {
+    return read();
+  } catch (const InputError& error) {
+    if (use == ShapeUse::seen) throw;
+    throw TooLarge(error.source(), error.message());
+  }
 }
 
 // Checks the corners of a mesh times its scale: no number reader has checked these lengths.
@@ -313,7 +345,7 @@ const Element* shape_of(const Element& element) {
 }  // namespace
 
 std::optional<Geometry> read_geometry(const Element& element, const std::string& where,
-                                      ReadContext& context, bool collides_moving) {
+                                      ReadContext& context, ShapeUse use) {
   const Element* shape = shape_of(element);
   if (!shape) return std::nullopt;
   const auto unless_too_large = [&](std::optional<Geometry> g) -> std::optional<Geometry> {
@@ -330,10 +362,13 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   if (kind == "cone") return sized.round(Shape::cone);
   if (kind == "ellipsoid") return sized.ellipsoid();
   if (kind == "plane") return sized.plane();
-  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context, collides_moving));
+  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context, use));
   if (kind == "polyline")
-    return unless_too_large(read_polyline(element, *shape, where, context, collides_moving));
-  if (kind == "heightmap") return unless_too_large(read_heightmap(*shape, where, context));
+    return unless_too_large(read_polyline(element, *shape, where, context, use));
+  if (kind == "heightmap") {
+    return unless_too_large(
+        read_ground(use, [&] { return read_heightmap(*shape, where, context, use); }));
+  }
   const std::string near =
       nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",
                           "mesh", "polyline", "heightmap"});

@@ -1,4 +1,4 @@
-// Shapes: SDF's <geometry>, and the meshes made from polylines and heightmaps.
+// Shapes: SDF's <geometry>, and the meshes made from polylines.
 #pragma once
 
 #include <optional>
@@ -9,17 +9,17 @@
 
 namespace ruedo::world {
 
+// What a shape is for. A mesh that collides and moves is divided into convex pieces, as its
+// `optimization` says.
+enum class ShapeUse { seen, collides, collides_moving };
+
 // Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
-// which. collides_moving: a mesh is divided into convex pieces, as its `optimization` says.
+// which. Throws TooLarge for a heightmap that collides and cannot be used: it is the ground.
 std::optional<Geometry> read_geometry(const Element& geometry, const std::string& where,
-                                      ReadContext& context, bool collides_moving);
+                                      ReadContext& context, ShapeUse use);
 
 // Prisms over the polygons (even-odd: a polygon inside another is a hole) from z = 0 to `height`.
 // Throws std::runtime_error for polygons without area or with crossing edges.
 Mesh extruded(const std::vector<std::vector<Eigen::Vector2d>>& polygons, double height);
-
-// A heightmap from a picture file, one height per pixel; size in metres, centred at the origin.
-// Throws std::runtime_error for a picture that cannot be read.
-Mesh heightmap(const std::string& picture, const Vec3& size);
 
 }  // namespace ruedo::world

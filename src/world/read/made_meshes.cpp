@@ -1,13 +1,10 @@
-// Procedural meshes: prisms over polylines (ear clipping, holes joined by bridges) and heightmaps.
+// Prisms over polylines: ear clipping, holes joined by bridges.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
-#include "base/input_file.h"
-#include "world/mesh/codecs.h"
 #include "world/mesh/mesh_format.h"
-#include "world/mesh/picture.h"
 #include "world/read/geometry.h"
 
 namespace ruedo::world {
@@ -172,77 +169,6 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
   }
   mesh.parts.push_back({"polyline", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
   mesh.closed = is_closed(mesh);
-  return mesh;
-}
-
-namespace {
-
-// Elevations from the lowest (0) to the highest (1). What was not measured is the lowest.
-cv::Mat normalized(const cv::Mat& elevation) {
-  constexpr float kNoData = -9000.0f;  // m; beyond the deepest sea, by custom
-  cv::Mat heights;
-  elevation.convertTo(heights, CV_32F);
-  float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
-  const auto known = [](float z) { return std::isfinite(z) && z > kNoData && z < -kNoData; };
-  for (auto at = heights.begin<float>(); at != heights.end<float>(); ++at) {
-    if (!known(*at)) continue;
-    lowest = std::min(lowest, *at);
-    highest = std::max(highest, *at);
-  }
-  if (lowest > highest) throw std::runtime_error("it holds no elevation");
-  for (auto at = heights.begin<float>(); at != heights.end<float>(); ++at)
-    *at = known(*at) && highest > lowest ? (*at - lowest) / (highest - lowest) : 0.0f;
-  return heights;
-}
-
-}  // namespace
-
-Mesh heightmap(const std::string& picture, const Vec3& size) {
-  const std::string bytes = read_input(picture, 64 << 20);
-  constexpr int kMost = 1025;
-  if (const std::string fault = picture_fault(bytes, kMost); !fault.empty())
-    throw std::runtime_error(fault);
-  cv::Mat grey;
-  try {
-    grey = decode_picture(bytes.data(), bytes.size(), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
-  } catch (const cv::Exception&) {
-    throw std::runtime_error("the picture is broken");
-  }
-  if (grey.empty())
-    throw std::runtime_error("it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)");
-  if (grey.depth() == CV_16S || grey.depth() == CV_32F || grey.depth() == CV_64F)
-    grey = normalized(grey);
-  else if (grey.depth() != CV_8U && grey.depth() != CV_16U)
-    throw std::runtime_error("its pixels are neither of 8 or 16 bits nor floating-point numbers");
-  if (grey.cols < 2 || grey.rows < 2 || grey.cols > kMost || grey.rows > kMost) {
-    throw std::runtime_error("it has " + std::to_string(grey.cols) + " x " +
-                             std::to_string(grey.rows) + " pixels; allowed are 2 to 1025 each way");
-  }
-  const double white = grey.depth() == CV_8U ? 255.0 : grey.depth() == CV_16U ? 65535.0 : 1.0;
-  Mesh mesh;
-  mesh.positions.reserve(static_cast<size_t>(grey.cols) * grey.rows);
-  // the picture's first row is the one with the largest y
-  for (int row = 0; row < grey.rows; ++row) {
-    for (int column = 0; column < grey.cols; ++column) {
-      const double value = grey.depth() == CV_8U    ? grey.at<uint8_t>(row, column)
-                           : grey.depth() == CV_16U ? grey.at<uint16_t>(row, column)
-                                                    : grey.at<float>(row, column);
-      const double u = static_cast<double>(column) / (grey.cols - 1),
-                   v = 1.0 - static_cast<double>(row) / (grey.rows - 1);
-      mesh.positions.push_back(
-          Vec3((u - 0.5) * size.x(), (v - 0.5) * size.y(), value / white * size.z()).cast<float>());
-      mesh.uvs.emplace_back(static_cast<float>(u), static_cast<float>(v));
-    }
-  }
-  for (int row = 0; row + 1 < grey.rows; ++row) {
-    for (int column = 0; column + 1 < grey.cols; ++column) {
-      const uint32_t a = static_cast<uint32_t>(row * grey.cols + column), b = a + 1,
-                     c = a + static_cast<uint32_t>(grey.cols), d = c + 1;
-      mesh.triangles.push_back({a, c, b});
-      mesh.triangles.push_back({b, c, d});
-    }
-  }
-  mesh.parts.push_back({"heightmap", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
   return mesh;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "world/model/height_grid.h"
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
@@ -9,8 +10,11 @@ namespace ruedo::world {
 
 void TriangleCount::add(const std::shared_ptr<const Mesh>& mesh, const Vec3& scale,
                         const Element& shape) {
+  constexpr size_t kHeightsOfTriangle = 25;  // a height takes little memory
   if (!seen_.insert({mesh, scale.x(), scale.y(), scale.z()}).second) return;
-  triangles_ += static_cast<int64_t>(mesh->triangles.size());
+  const HeightGrid* grid = grid_of(*mesh);
+  triangles_ += static_cast<int64_t>(grid ? grid->vertex_count() / kHeightsOfTriangle
+                                          : mesh->triangles.size());
   if (triangles_ <= kMostTriangles) return;
   throw TooLarge(shape.source,
                  "<" + shape.name + ">: the meshes have more than " +

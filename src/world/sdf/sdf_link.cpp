@@ -372,7 +372,10 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     const std::string here = where + "/" + child.name + " " + required_name(child);
     const Element* shape = child.child("geometry");
     if (!shape) child.fail("has no <geometry>");
-    auto geometry = read_geometry(*shape, here, context, moves && child.name == "collision");
+    const ShapeUse use = child.name == "visual" ? ShapeUse::seen
+                         : moves                ? ShapeUse::collides_moving
+                                                : ShapeUse::collides;
+    auto geometry = read_geometry(*shape, here, context, use);
     if (!geometry) return;
     const Pose pose = pose_in_link(child);
     if (child.name == "collision")
