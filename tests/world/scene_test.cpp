@@ -201,6 +201,8 @@ TEST(Scene, ActorsWalkAsCylinders) {
       "0</pose></waypoint></trajectory><trajectory id='1'/></script></actor>");
   EXPECT_EQ(odd->models.at(0).model->path->all("ruedo:waypoint").size(), 3u);
   EXPECT_THAT(texts(*odd), testing::Contains(testing::HasSubstr("this one is left out")));
+  EXPECT_THAT(texts(*world_of("<actor name='a'/><actor name='b'/><actor name='c'/>")),
+              testing::ElementsAre(testing::HasSubstr("a cylinder of 1.7 m (and 2 more do)")));
 }
 
 // One trajectory after another, each with a clock of its own; feet on the floor of each storey,

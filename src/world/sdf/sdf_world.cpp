@@ -315,21 +315,21 @@ Link own_shape(const Element& actor, const std::string& where, ReadContext& cont
   return all;
 }
 
-}  // namespace
+// `others`: how many more actors there are of which the same is true.
+void name_cylinder(const Element& actor, size_t others, Findings& findings) {
+  findings.unsupported(
+      actor.source, "actor " + required_name(actor),
+      "the actor moves as a cylinder of 1.7 m" +
+          (others ? " (and " + std::to_string(others) + " more do)" : std::string()) +
+          "; skins and animations are not shown");
+}
 
-// An actor becomes a person: a cylinder on the floor that moves along its trajectories, without a
-// skin. One that has no skin, but shapes, is moved as these.
-std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
-                                                    ReadContext& context) {
+std::shared_ptr<const Model> person(const Element& actor, Pose& X_WM, ReadContext& context) {
   constexpr double kHeight = 1.7, kRadius = 0.25;  // m
   auto model = std::make_shared<Model>();
   model->name = required_name(actor);
   model->source = actor.source;
   const std::string where = "actor " + model->name;
-  if (!has_own_shape(actor))
-    context.findings.unsupported(
-        actor.source, where,
-        "actors move as cylinders of 1.7 m; skins and animations are not shown");
   name_plugins_of_actor(actor, where, context.findings);
   X_WM = actor.pose("pose");
   auto path = std::make_shared<Element>();
@@ -352,6 +352,16 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
                                               : person_link(kRadius, kHeight, actor.source));
   model->is_static = !model->path;
   return model;
+}
+
+}  // namespace
+
+// An actor becomes a person: a cylinder on the floor that moves along its trajectories, without a
+// skin. One that has no skin, but shapes, is moved as these.
+std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
+                                                    ReadContext& context) {
+  if (!has_own_shape(actor)) name_cylinder(actor, 0, context.findings);
+  return person(actor, X_WM, context);
 }
 
 namespace {
@@ -409,6 +419,7 @@ class SdfReader::WorldReader {
     name_lost_frames();
     name_wind_without_plugin(element_, world_, findings_);
     check_performers(world_, reader_.performers_, findings_);
+    if (first_actor_) name_cylinder(*first_actor_, actors_.size() - 1, findings_);
     stand_actors(actors_, world_);
     const size_t placed = world_.models.size();
     for (const Element* fleet : element_.all("ruedo:fleet"))
@@ -590,7 +601,7 @@ class SdfReader::WorldReader {
 
   void place_actor(const Element& actor, const std::string& name, const Element& by) {
     auto scope = std::make_shared<ScopedModel>();
-    scope->model = actor_model(actor, scope->pose, context_);
+    scope->model = person(actor, scope->pose, context_);
     FrameGraph::Node node;
     node.name = name;
     node.element = &by;
@@ -598,7 +609,9 @@ class SdfReader::WorldReader {
     node.scope = scope;
     frames_.add(node);
     placed_.push_back({name, &by, scope});
-    if (!has_own_shape(actor)) actors_.insert(dotted(name));
+    if (has_own_shape(actor)) return;
+    if (actors_.empty()) first_actor_ = &actor;
+    actors_.insert(dotted(name));
   }
 
   void add_model(const Placed& each, const SavedState& saved) {
@@ -640,7 +653,8 @@ class SdfReader::WorldReader {
   std::string in_world_;  // for findings
   FrameGraph frames_{"the world"};
   std::vector<Placed> placed_;
-  std::set<std::string> actors_;
+  std::set<std::string> actors_;  // those that move as cylinders
+  const Element* first_actor_ = nullptr;
   std::set<std::string> added_;         // names of those of fleets and crowds
   std::map<std::string, int> numbers_;  // the next number for each name
 };
