@@ -25,6 +25,17 @@ try:
 except ruedo.LaunchError as error:
     assert "searched" in str(error)
 PYTHON
+# Ten minutes, as docs/getting-started.md has them, with the room that it draws without a browser.
+venv/bin/python - "$source/docs/getting-started.md" <<'PYTHON'
+import pathlib, re, sys
+page = pathlib.Path(sys.argv[1]).read_text(encoding="utf-8")
+pathlib.Path("room.sh").write_text(re.search(r"^```sh test\n(cat > room.sdf.*?)^```", page, re.M | re.S)[1], encoding="utf-8")
+for name, text in re.findall(r'^```python title="(\w+\.py)"\n(.*?)^```', page, re.M | re.S):
+    pathlib.Path(name).write_text(text, encoding="utf-8")
+PYTHON
+PATH=$PWD/venv/bin:$PATH bash -eux room.sh
+venv/bin/python drive.py
+venv/bin/python -c 'import test_room; test_room.test_robot_advances_half_a_metre()'
 # Beside another environment: each starts the server of its own.
 "$python" -m venv other
 other/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[camera]'
