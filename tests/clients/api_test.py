@@ -302,7 +302,7 @@ def test_maps_are_read_and_written(language, tmp_path):
         ("missing", "missing.yaml: resolution, origin is missing"),
         ("resolution", "resolution.yaml: resolution is "),
         ("origin", "origin.yaml: origin is "),
-        ("short", "short.pgm: a PGM of 8 bits with 4 x 3 pixels is wanted, and 11 bytes are there"),
+        ("short", "short.pgm: expected an 8-bit PGM of 4 x 3 pixels, found 11 bytes"),
         ("picture", "picture.pgm"),
     ):
         assert words in said.one(what)

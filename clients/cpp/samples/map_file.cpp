@@ -88,7 +88,7 @@ class Head {
     double value = 0.0;
     if (read_number(found->second, value) && value > 0.0) return value;
     throw Error(path_ + ": " + key + " is '" + found->second +
-                "': a number above 0, 1e6 at most, is wanted");
+                "': expected a number above 0, at most 1e6");
   }
 
   Map::Origin origin() const {
@@ -100,7 +100,7 @@ class Head {
       good = count < 3 && read_number(part, values[count]);
     if (good && count == 3) return {values[0], values[1], values[2]};
     throw Error(path_ + ": origin is '" + values_.at("origin") +
-                "': three numbers are wanted, x, y and heading");
+                "': expected three numbers: x, y and heading");
   }
 
   bool negated() const {
@@ -131,9 +131,9 @@ struct Picture {
     }
     pixels.erase(0, std::min(at + 1, pixels.size()));
     if (largest == 255 && width > 0 && height > 0 && width <= pixels.size() / height) return;
-    throw Error(path.string() + ": a PGM of 8 bits with " + std::to_string(width) + " x " +
-                std::to_string(height) + " pixels is wanted, and " + std::to_string(pixels.size()) +
-                " bytes are there");
+    throw Error(path.string() + ": expected an 8-bit PGM of " + std::to_string(width) + " x " +
+                std::to_string(height) + " pixels, found " + std::to_string(pixels.size()) +
+                " bytes");
   }
 };
 

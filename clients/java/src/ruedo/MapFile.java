@@ -139,7 +139,7 @@ final class MapFile {
         if (value > 0.0) return value;
         throw wrong(
                 path,
-                key + " is '" + values.get(key) + "': a number above 0, 1e6 at most, is wanted");
+                key + " is '" + values.get(key) + "': expected a number above 0, at most 1e6");
     }
 
     private double[] origin() {
@@ -151,7 +151,7 @@ final class MapFile {
                 path,
                 "origin is '"
                         + values.get("origin")
-                        + "': three numbers are wanted, x, y and heading");
+                        + "': expected three numbers: x, y and heading");
     }
 
     /** Of a PGM of 8 bits, by rows from the top. */
@@ -176,7 +176,7 @@ final class MapFile {
             throw wrong(
                     path,
                     String.format(
-                            "a PGM of 8 bits with %d x %d pixels is wanted, and %d bytes are there",
+                            "expected an 8-bit PGM of %d x %d pixels, found %d bytes",
                             width, height, content.length - begin));
         byte[][] rows = new byte[(int) height][(int) width];
         for (byte[] row : rows) {
