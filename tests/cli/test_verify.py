@@ -385,15 +385,15 @@ elevation="0"/><floor name="L2" elevation="1.5"/><v_max_cabin>2</v_max_cabin><a_
 </plugin></model></world></sdf>"""
 
 
-def test_a_lift_that_is_called_is_repeated(tmp_path):
+def test_a_lift_that_is_called_is_repeated(tmp_path, monkeypatch):
     world, log = tmp_path / "house.sdf", tmp_path / "lift.lcm"
     world.write_text(LIFT)
     page = (SOURCE / "docs/world-files.md").read_text(encoding="utf-8")
     snippet = re.search(r"<!-- test: lift -->\n```python\n(.*?)```", page, re.DOTALL)[1]
     server = Server(7838, "--lockstep", "1", "--record", log, world=world)
     with server.connect() as simulation:
-        names = {"ruedo": ruedo, "joint_command_t": joint_command_t, "sim": simulation}
-        exec(snippet, names)
+        monkeypatch.setenv("LCM_DEFAULT_URL", server.url)
+        exec(snippet, {})
         simulation.quit()
     assert server.end()[0] == 0
     heights = [
