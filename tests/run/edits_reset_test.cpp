@@ -267,7 +267,7 @@ TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
        reply_t::BAD_REQUEST, "folders that are searched"},
       {with([](auto& body) { body.text.clear(), body.model = "nosuchrobot"; }),
        reply_t::BAD_REQUEST, "nosuchrobot"},
-      {with([](auto& body) { body.name = "ruedo"; }), reply_t::BAD_REQUEST, "kept for Ruedo"},
+      {with([](auto& body) { body.name = "ruedo"; }), reply_t::BAD_REQUEST, "reserved for Ruedo"},
       {with([](auto& body) { body.name = "a/b"; }), reply_t::BAD_REQUEST, "not fit for a channel"},
       {with([](auto& body) { body.name = "a b"; }), reply_t::BAD_REQUEST, "not fit for a channel"},
       {with([](auto& body) { body.name = "\xff\xfe"; }), reply_t::BAD_REQUEST, "not UTF-8 text"},

@@ -438,7 +438,7 @@ TEST_F(RestoreTest, WhatIsTooFarOrBreaksOffIsRefusedBeforeAnythingChanges) {
   for (const int64_t steps : {kMostSteps + 1, std::numeric_limits<int64_t>::max()}) {
     lead_to("far", steps);
     refused("far.snapshot is " + std::to_string(steps) +
-            " steps from its beginning; RESTORE goes 1000000000 at most");
+            " steps from its beginning; RESTORE repeats 1000000000 at most");
   }
   fs::resize_file(file("far"), fs::file_size(file("far")) - 1);
   refused("far.snapshot: is not a snapshot: cut off in the event that begins at byte ");

@@ -130,7 +130,7 @@ TEST(StallWatch, NamesTheChannelThatIsWaitedFor) {
   RunOptions options = fast(1);
   options.wait_for = {{"r/velocity", {10, 1}}};
   EXPECT_THAT(reason_of(options, "", bus, told),
-              HasSubstr("--wait-for wants, message 0 on r/velocity"));
+              HasSubstr("the input of --wait-for, message 0 on r/velocity"));
 }
 
 TEST(StallWatch, NamesTheModuleThatIsAtWork) {

@@ -155,7 +155,7 @@ TEST(PluginParameters, AreNamed) {
       {"libgazebo_ros_camera.so", "p", "<focalLength>500</focalLength>", "<camera>"},
       {"libgazebo_ros_imu_sensor.so", "p",
        "<initial_orientation_as_reference>true</initial_orientation_as_reference>",
-       "that in the world"},
+       "relative to the world"},
       {"libgazebo_ros_planar_move.so", "p", "<covariance_x>0.1</covariance_x>", "no covariance"},
       {"libgazebo_ros_planar_move.so", "p", "<cmdTimeout>0.5</cmdTimeout>", "watchdog"},
       {"libgazebo_ros_diff_drive.so", "p", "<odometrySource>world</odometrySource>", "its wheels"},
