@@ -11,6 +11,7 @@ pkg_check_modules(URDFDOM REQUIRED urdfdom console_bridge)    # console_bridge: 
 pkg_check_modules(YAMLCPP REQUIRED IMPORTED_TARGET yaml-cpp)
 pkg_check_modules(LIBCRYPTO REQUIRED IMPORTED_TARGET libcrypto)
 pkg_check_modules(ZLIB REQUIRED IMPORTED_TARGET zlib)
+pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(SECCOMP REQUIRED IMPORTED_TARGET libseccomp)
 # Double precision: its own libraries, and -DBT_USE_DOUBLE_PRECISION in the flags.
 pkg_check_modules(BULLET REQUIRED bullet-float64)

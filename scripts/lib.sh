@@ -15,7 +15,7 @@ readonly BUILD_PACKAGES=(
   libbullet-dev libtinyxml2-dev liburdfdom-dev libyaml-cpp-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
-  libcli11-dev libspdlog-dev libfmt-dev libssl-dev zlib1g-dev libseccomp-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev nlohmann-json3-dev cyclonedds-dev
+  libcli11-dev libspdlog-dev libfmt-dev libssl-dev zlib1g-dev libzstd-dev libseccomp-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev nlohmann-json3-dev cyclonedds-dev
   musl-dev
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <zstd.h>
 
 #include "base/crc32.h"
 #include "base/input_file.h"
@@ -137,16 +138,18 @@ class McapFile {
 
   void read_chunk(const std::vector<uint8_t>& record) {
     Fields fields(record);
-    fields.take(24);  // times, and the size when it is not compressed
+    fields.take(16);  // times
+    const auto size = fields.number<uint64_t>();
     const auto crc = fields.number<uint32_t>();
     const std::string compression = fields.text();
-    const std::span<const uint8_t> all = fields.take(fields.number<uint64_t>());
+    std::span<const uint8_t> all = fields.take(fields.number<uint64_t>());
     if (!fields.good()) damaged("has a damaged chunk");
-    if (!compression.empty())
-      throw InputError({path_},
-                       "is compressed (" + compression +
-                           "); Ruedo reads uncompressed files: `mcap compress --compression "
-                           "none` makes such a file");
+    if (compression == "zstd")
+      all = unpacked(all, size);
+    else if (!compression.empty())
+      throw InputError({path_}, "is compressed by " + compression +
+                                    "; allowed is zstd: `mcap compress --compression zstd` makes "
+                                    "such a file");
     if (crc != 0 && crc32(all.data(), all.size()) != crc)
       damaged("has a chunk whose CRC-32 is wrong");
     Fields records(all);
@@ -156,6 +159,16 @@ class McapFile {
       if (!records.good()) damaged("has a damaged chunk");
       read_record(op, one);
     }
+  }
+
+  // size: as the chunk says.
+  std::span<const uint8_t> unpacked(std::span<const uint8_t> packed, uint64_t size) {
+    if (size > kMostRecord)
+      damaged(fmt::format("has a chunk of {} bytes (at most {} are allowed)", size, kMostRecord));
+    unpacked_.resize(size);
+    if (ZSTD_decompress(unpacked_.data(), size, packed.data(), packed.size()) != size)
+      damaged("has a chunk that is not what was written (zstd)");
+    return unpacked_;
   }
 
   void read_record(uint8_t op, std::span<const uint8_t> record) {
@@ -197,6 +210,7 @@ class McapFile {
   uint64_t size_ = 0, offset_ = 0, begin_ = 0;              // begin_: of the record
   std::map<std::pair<uint8_t, uint16_t>, uint64_t> names_;  // bytes, by operation and id
   uint64_t all_names_ = 0;
+  std::vector<uint8_t> unpacked_;  // of a chunk
   std::map<uint16_t, std::string> schemas_;
   std::map<uint16_t, McapChannel> channels_;
 };

@@ -1,5 +1,5 @@
 // Reads MCAP files (mcap.dev/spec) from one end to the other: messages in the file's order, and
-// attachments. Of files that are not compressed.
+// attachments. Of files that are compressed by zstd, or not at all.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ struct McapHandler {
   std::function<void(const std::string& name, uint64_t offset, uint64_t size)> attachment;
 };
 
-// Either of the two may be empty. Throws InputError for what is no such file, is compressed,
-// damaged or cut off: with the place.
+// Either of the two may be empty. Throws InputError for what is no such file, is compressed
+// otherwise, damaged or cut off: with the place.
 void read_mcap(const std::string& path, const McapHandler& handler);
 
 // Whether it begins as MCAP files do.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include <zstd.h>
+
 #include "base/crc32.h"
 #include "base/input_file.h"
 #include "base/version.h"
@@ -27,7 +29,8 @@ enum class Op : uint8_t {
   summary_offset = 14,
   data_end = 15,
 };
-constexpr std::string_view kMagic = "\x89MCAP0\r\n";
+constexpr std::string_view kMagic = "\x89MCAP0\r\n", kCompression = "zstd";
+constexpr int kLevel = 1;  // the fastest: a log costs more to read than to compress
 
 template <class Number>
 void put(std::string& bytes, Number value) {
@@ -59,14 +62,35 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
 
 }  // namespace
 
+class McapWriter::Compressor {
+ public:
+  // Valid until the next call.
+  std::string_view pack(std::string_view bytes) {
+    packed_.resize(ZSTD_compressBound(bytes.size()));
+    const size_t size = ZSTD_compressCCtx(context_.get(), packed_.data(), packed_.size(),
+                                          bytes.data(), bytes.size(), kLevel);
+    if (ZSTD_isError(size)) throw EnvironmentError(std::string("zstd: ") + ZSTD_getErrorName(size));
+    return {packed_.data(), size};
+  }
+
+ private:
+  struct Free {
+    void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+  };
+  std::unique_ptr<ZSTD_CCtx, Free> context_{ZSTD_createCCtx()};
+  std::vector<char> packed_;
+};
+
 McapWriter::McapWriter(const std::string& path, const std::string& profile)
-    : path_(path), file_(path) {
+    : path_(path), file_(path), compressor_(std::make_unique<Compressor>()) {
   write(kMagic);
   std::string fields;
   put_text(fields, profile);
   put_text(fields, std::string("Ruedo ") + version());
   write(record(Op::header, fields));
 }
+
+McapWriter::~McapWriter() = default;
 
 void McapWriter::write(std::string_view bytes) {
   file_.write(bytes);
@@ -130,28 +154,37 @@ void McapWriter::add_message(uint16_t channel, uint64_t time_ns, std::string_vie
 
 void McapWriter::end_chunk() {
   if (index_.empty()) return;
-  ChunkIndex chunk{chunk_begin_ns_, chunk_end_ns_, offset_, 0, 0, chunk_.size(), {}};
-  std::string fields;
-  put(fields, chunk_begin_ns_);
-  put(fields, chunk_end_ns_);
+  const std::string_view packed = compressor_->pack(chunk_);
+  std::string times;
+  put(times, chunk_begin_ns_);
+  put(times, chunk_end_ns_);
+  std::string fields = times;
   put(fields, static_cast<uint64_t>(chunk_.size()));
   put(fields, crc_of(chunk_));
-  put_text(fields, "");  // not compressed
-  put(fields, static_cast<uint64_t>(chunk_.size()));
-  fields += chunk_;
+  put_text(fields, kCompression);
+  put(fields, static_cast<uint64_t>(packed.size()));
+  fields += packed;
+  const uint64_t begin = offset_;
   write(record(Op::chunk, fields));
-  chunk.size = offset_ - chunk.offset;
   const uint64_t indexes = offset_;
+  std::map<uint16_t, uint64_t> index_offsets;
   for (const auto& [channel, entries] : index_) {
-    chunk.index_offsets[channel] = offset_;
+    index_offsets[channel] = offset_;
     std::string list;
     put(list, channel);
     put(list, static_cast<uint32_t>(entries.size() * sizeof(IndexEntry)));
     for (const IndexEntry& entry : entries) put(list, entry.time_ns), put(list, entry.offset);
     write(record(Op::message_index, list));
   }
-  chunk.index_size = offset_ - indexes;
-  chunks_.push_back(std::move(chunk));
+  std::string index = times;
+  put(index, begin);
+  put(index, indexes - begin);
+  put_map(index, index_offsets);
+  put(index, offset_ - indexes);
+  put_text(index, kCompression);
+  put(index, static_cast<uint64_t>(packed.size()));
+  put(index, static_cast<uint64_t>(chunk_.size()));
+  chunk_indexes_.push_back(record(Op::chunk_index, index));
   chunk_.clear();
   index_.clear();
 }
@@ -186,22 +219,6 @@ void McapWriter::add_attachment(const std::string& name, const std::string& medi
   put(end, crc);
   write(end);
   attachments_.push_back({name, media_type, offset, offset_ - offset, size});
-}
-
-std::vector<std::string> McapWriter::chunk_indexes() const {
-  std::vector<std::string> indexes;
-  for (const ChunkIndex& chunk : chunks_) {
-    std::string fields;
-    for (const uint64_t value : {chunk.begin_ns, chunk.end_ns, chunk.offset, chunk.size})
-      put(fields, value);
-    put_map(fields, chunk.index_offsets);
-    put(fields, chunk.index_size);
-    put_text(fields, "");
-    put(fields, chunk.records_size);
-    put(fields, chunk.records_size);
-    indexes.push_back(record(Op::chunk_index, fields));
-  }
-  return indexes;
 }
 
 std::vector<std::string> McapWriter::attachment_indexes() const {
@@ -240,12 +257,12 @@ void McapWriter::write_summary() {
   put(statistics, static_cast<uint32_t>(channels_.size()));
   put(statistics, static_cast<uint32_t>(attachments_.size()));
   put(statistics, uint32_t{0});  // metadata
-  put(statistics, static_cast<uint32_t>(chunks_.size()));
+  put(statistics, static_cast<uint32_t>(chunk_indexes_.size()));
   put(statistics, begin_ns_);
   put(statistics, end_ns_);
   put_map(statistics, counts_);
   group(Op::statistics, {record(Op::statistics, statistics)});
-  group(Op::chunk_index, chunk_indexes());
+  group(Op::chunk_index, chunk_indexes_);
   group(Op::attachment_index, attachment_indexes());
   const uint64_t offsets_begin = offset_;
   write(offsets);

@@ -1,9 +1,10 @@
-// Writes MCAP files (mcap.dev/spec): messages in chunks with their indexes, a summary, and
-// checksums. Not compressed.
+// Writes MCAP files (mcap.dev/spec): messages in chunks, compressed by zstd, with their indexes, a
+// summary, and checksums.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,7 +16,7 @@ namespace ruedo::log {
 class McapWriter {
  public:
   static constexpr size_t kChunkSize =
-      size_t{1} << 20;                       // bytes; a chunk ends with the message that passes it
+      size_t{4} << 20;                       // bytes; a chunk ends with the message that passes it
   static constexpr size_t kMostIds = 65535;  // schemas, and channels
 
   using Metadata = std::map<std::string, std::string>;
@@ -23,6 +24,7 @@ class McapWriter {
   // profile: MCAP's word for whose conventions hold, "ros2". Throws as OutputFile, as all that
   // follows does. What was at the path stays until finish().
   explicit McapWriter(const std::string& path, const std::string& profile = "");
+  ~McapWriter();
 
   // Both return an id. Throw InputError when there are too many.
   uint16_t add_schema(const std::string& name, const std::string& encoding, std::string_view data);
@@ -35,15 +37,13 @@ class McapWriter {
   void finish();
 
   uint64_t messages() const { return messages_; }
+  uint64_t size() const { return offset_; }  // bytes of the file so far
 
  private:
   struct IndexEntry {
     uint64_t time_ns, offset;
   };
-  struct ChunkIndex {
-    uint64_t begin_ns, end_ns, offset, size, index_size, records_size;
-    std::map<uint16_t, uint64_t> index_offsets;
-  };
+  class Compressor;
 
   struct Attachment {
     std::string name, media_type;
@@ -53,7 +53,6 @@ class McapWriter {
   void write(std::string_view bytes);
   void end_chunk();
   void write_summary();
-  std::vector<std::string> chunk_indexes() const;
   std::vector<std::string> attachment_indexes() const;
 
   std::string path_;
@@ -66,7 +65,8 @@ class McapWriter {
   std::string chunk_;  // records of the chunk that is open
   std::map<uint16_t, std::vector<IndexEntry>> index_;
   uint64_t chunk_begin_ns_ = 0, chunk_end_ns_ = 0, begin_ns_ = 0, end_ns_ = 0, messages_ = 0;
-  std::vector<ChunkIndex> chunks_;
+  std::unique_ptr<Compressor> compressor_;
+  std::vector<std::string> chunk_indexes_;  // records
   std::vector<Attachment> attachments_;
 };
 

@@ -363,12 +363,21 @@ def test_a_bag_of_another_program_has_no_scene(tmp_path):
 
 def test_a_compressed_one_says_how_it_is_read(tmp_path):
     with (tmp_path / "run.mcap").open("wb") as file:
-        writer = mcap.writer.Writer(file)  # zstd
+        writer = mcap.writer.Writer(file, compression=mcap.writer.CompressionType.LZ4)
         writer.start()
         channel = writer.register_channel("/a", "cdr", writer.register_schema("a", "ros2msg", b""))
         writer.add_message(channel, 1, b"1234" * 100, 1)
         writer.finish()
-    assert "is compressed (zstd)" in refused(tmp_path / "run.mcap")
+    assert "is compressed by lz4; allowed is zstd" in refused(tmp_path / "run.mcap")
+
+
+def test_chunks_are_compressed(logged):
+    """By the library mcap; each unpacks to the size and the CRC-32 that it names."""
+    with (logged / "run/run_0.mcap").open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+        assert chunks and all(chunk.compression == "zstd" for chunk in chunks)
+        assert all(chunk.compressed_size < chunk.uncompressed_size for chunk in chunks)
+        assert list(make_reader(file, validate_crcs=True).iter_messages())
 
 
 MAGIC = b"\x89MCAP0\r\n"
