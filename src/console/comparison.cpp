@@ -37,7 +37,7 @@ std::optional<Message> decoded(std::span<const uint8_t> bytes) {
 }
 
 template <class Message>
-std::optional<Message> read(log::Reader& reader, const log::Index::Entry& entry) {
+std::optional<Message> read(log::Reader& reader, const log::Place& entry) {
   if (entry.size > kMostMessage) return std::nullopt;
   log::Event event;
   reader.seek(entry.offset);
@@ -174,7 +174,7 @@ const std::vector<int32_t>& Comparison::Ghosts::matched(const run::LogWorlds::Sc
 void Comparison::Ghosts::show(Board& board, size_t channel, SimTime time_us) {
   if (!comparison_->states_) return;
   const log::Index::Channel& states = comparison_->other_.channels()[*comparison_->states_];
-  const size_t count = std::max<size_t>(states.count_until(time_us), 1);
+  const size_t count = std::max<size_t>(states.places.count_until(time_us), 1);
   const run::LogWorlds::Scene& shown = comparison_->worlds_.at(time_us);
   const run::LogWorlds::Scene& other = comparison_->other_worlds_.at(time_us);
   if (count == shown_ && &shown == matched_shown_ && &other == matched_other_) return;
@@ -182,7 +182,7 @@ void Comparison::Ghosts::show(Board& board, size_t channel, SimTime time_us) {
   const std::vector<int32_t>& places = matched(shown, other);
   std::vector<world_state_t> parts;
   for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
-    auto part = read<world_state_t>(reader_, states.entries[entry - 1]);
+    auto part = read<world_state_t>(reader_, states.places[entry - 1]);
     if (!part) break;
     parts.push_back(std::move(*part));
     if (parts.back().part == 0) break;
@@ -215,14 +215,13 @@ void Comparison::Ghosts::show(Board& board, size_t channel, SimTime time_us) {
 // At the times of the log's poses; the other run's pose is interpolated linearly.
 std::vector<Comparison::Sample> Comparison::samples(const Robot& robot, size_t most) const {
   log::Reader shown_reader(log_), other_reader(path_);
-  const auto& ours = index_.channels()[robot.shown].entries;
-  const log::Index::Channel& channel = other_.channels()[robot.other];
-  const auto& theirs = channel.entries;
+  const auto& ours = index_.channels()[robot.shown].places;
+  const log::Places& theirs = other_.channels()[robot.other].places;
   const size_t every = 1 + ours.size() / std::max<size_t>(most, 1);
   std::vector<Sample> found;
   for (size_t i = 0; i < ours.size() && !ending_; i += every) {
     const SimTime time_us = ours[i].time_us;
-    const size_t count = channel.count_until(time_us);
+    const size_t count = theirs.count_until(time_us);
     if (count == 0 || (count == theirs.size() && theirs.back().time_us < time_us)) continue;
     const auto here = read<pose_t>(shown_reader, ours[i]);
     const auto before = read<pose_t>(other_reader, theirs[count - 1]);
@@ -250,7 +249,7 @@ http::Bytes Comparison::apart(const std::string& name, const std::string& field)
   const auto robot = std::find_if(robots_.begin(), robots_.end(),
                                   [&](const Robot& each) { return printable(each.name) == name; });
   if (robot == robots_.end() || (field != "distance" && field != "angle")) return nullptr;
-  const size_t entries = index_.channels()[robot->shown].entries.size();
+  const size_t entries = index_.channels()[robot->shown].places.size();
   const size_t every = 1 + entries / kMostPlotted;
   std::vector<double> numbers{static_cast<double>(every)};
   for (const Sample& sample : samples(*robot, kMostPlotted)) {

@@ -315,23 +315,31 @@ EventScan::EventScan(const log::Index& index, const world::WorldModel* world) {
     const bool draws = channel.fingerprint == markers_t::getHash() && !written;
     const bool tells = Events::tells(channel.fingerprint) && (needed || tells_touches(*schema));
     if (!draws && !tells) continue;
-    for (const log::Index::Entry& entry : channel.entries)
-      places_.push_back({entry.time_us, entry.offset});
+    log::Places::Cursor cursor(channel.places);
+    if (const log::Place* first = cursor.next()) sources_.push_back({std::move(cursor), *first});
   }
-  std::sort(places_.begin(), places_.end(),
-            [](const Place& a, const Place& b) { return a.offset < b.offset; });
+  std::ranges::make_heap(sources_, later);
 }
 
 bool EventScan::advance(log::Reader& reader, size_t messages) {
-  for (; messages > 0 && next_ < places_.size(); --messages, ++next_) {
-    reader.seek(places_[next_].offset);
+  for (; messages > 0 && !sources_.empty(); --messages) {
+    std::ranges::pop_heap(sources_, later);
+    Source& source = sources_.back();
+    const log::Place place = source.next;
+    if (const log::Place* next = source.cursor.next()) {
+      source.next = *next;
+      std::ranges::push_heap(sources_, later);
+    } else {
+      sources_.pop_back();
+    }
+    reader.seek(place.offset);
     if (!reader.next(event_)) continue;
-    events_.hear(static_cast<double>(places_[next_].time_us) * 1e-6, event_.channel, event_.data);
+    events_.hear(static_cast<double>(place.time_us) * 1e-6, event_.channel, event_.data);
     std::string layer = layer_of(event_.data);
     if (const auto applied = decoded<applied_t>(event_.data)) layer = layer_of(applied->data);
-    if (!layer.empty()) drawn_.add(layer, {places_[next_].time_us, places_[next_].offset});
+    if (!layer.empty()) drawn_.add(layer, {place.time_us, place.offset});
   }
-  return next_ == places_.size();
+  return sources_.empty();
 }
 
 void write_events(JsonWriter& json, std::span<const Event> events) {

@@ -95,12 +95,14 @@ class EventScan {
   const Drawn& drawn() const { return drawn_; }
 
  private:
-  struct Place {
-    SimTime time_us;
-    int64_t offset;
+  // A channel whose messages may give events, and its next message.
+  struct Source {
+    log::Places::Cursor cursor;
+    log::Place next;
   };
-  std::vector<Place> places_;  // messages that may give events, by time
-  size_t next_ = 0;
+  static bool later(const Source& a, const Source& b) { return a.next.offset > b.next.offset; }
+
+  std::vector<Source> sources_;  // a heap: the first has the next message of the log
   Events events_{false};
   Drawn drawn_;
   log::Event event_;

@@ -16,6 +16,7 @@
 #include "base/base64.h"
 #include "base/channel_names.h"
 #include "base/json.h"
+#include "base/lcm_log.h"
 #include "base/utf8.h"
 #include "console/assets.h"
 #include "console/board.h"
@@ -47,26 +48,33 @@ bool are_pictures(const log::Index::Channel& channel) {
   return channel.fingerprint == image_t::getHash();
 }
 
-// Which entries of a channel remain if there is one for each such interval, the first in it; always
-// including the last.
-std::vector<size_t> thinned(const log::Index::Channel& channel, SimTime interval_us) {
-  std::vector<size_t> kept;
+// Calls keep(i, place) for each message of a channel that remains if there is one for each such
+// interval, the first in it; always including the last.
+template <class Keep>
+void thin(const log::Index::Channel& channel, SimTime interval_us, Keep keep) {
   SimTime due_us = std::numeric_limits<SimTime>::min();
-  for (size_t i = 0; i < channel.entries.size(); ++i) {
-    const log::Index::Entry& entry = channel.entries[i];
-    const bool last = i + 1 == channel.entries.size();
-    if (entry.size > kMostMessage || (entry.time_us < due_us && !last)) continue;
-    kept.push_back(i);
-    if (interval_us > 0) due_us = entry.time_us - entry.time_us % interval_us + interval_us;
+  log::Places::Cursor cursor(channel.places);
+  for (size_t i = 0; const log::Place* place = cursor.next(); ++i) {
+    const bool last = i + 1 == channel.places.size();
+    if (place->size > kMostMessage || (place->time_us < due_us && !last)) continue;
+    keep(i, *place);
+    if (interval_us > 0) due_us = place->time_us - place->time_us % interval_us + interval_us;
   }
-  return kept;
 }
 
+// Bytes of the page that messages take; the last of a channel may come with the parts before it.
 size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
   size_t sum = 0;
   for (const log::Index::Channel& channel : index.channels()) {
     if (are_pictures(channel) != pictures) continue;
-    for (const size_t i : thinned(channel, interval_us)) sum += channel.entries[i].size + kHead;
+    const size_t before = kLogHeadSize + channel.name.size();  // in the log
+    const auto add = [&](size_t, const log::Place& place) {
+      if (place.size <= kMostMessage) sum += kHead + sizeof(uint32_t) + place.size - before;
+    };
+    thin(channel, interval_us, add);
+    const SimTime end_us = channel.places.back().time_us;
+    for (size_t i = channel.places.size(); i-- > 0 && channel.places[i].time_us == end_us;)
+      add(i, channel.places[i]);
   }
   return sum;
 }
@@ -230,8 +238,9 @@ class Writer {
       if (channel.fingerprint == world_info_t::getHash()) info_ = names_.back();
       const SimTime interval = are_pictures(channel) ? pictures_us : interval_us;
       if (interval < 0 || channel.fingerprint == markers_t::getHash()) continue;  // see add_drawn
-      for (const size_t i : thinned(channel, interval))
-        add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
+      thin(channel, interval, [&](size_t i, const log::Place& place) {
+        add_entry(static_cast<uint32_t>(c), place.time_us, whole(channel, i));
+      });
     }
     if (!info_.empty()) return;
     info_ = kInfoChannel;
@@ -244,7 +253,7 @@ class Writer {
   std::vector<std::vector<uint8_t>> whole(const log::Index::Channel& channel, size_t entry) {
     std::vector<std::vector<uint8_t>> parts;
     for (size_t i = entry + 1; i-- > 0 && parts.size() < Board::kMostParts;) {
-      reader_.seek(channel.entries[i].offset);
+      reader_.seek(channel.places[i].offset);
       if (!reader_.next(event_)) break;
       parts.insert(parts.begin(), event_.data);
       if (!Board::is_later_part(parts.front())) break;

@@ -91,7 +91,7 @@ bool read_fields(std::span<const uint8_t> message, std::vector<PlottedField>& fi
   return std::any_of(fields.begin(), fields.end(), [](const auto& field) { return field.found(); });
 }
 
-bool read(log::Reader& reader, const log::Index::Entry& wanted, log::Event& event) {
+bool read(log::Reader& reader, const log::Place& wanted, log::Event& event) {
   if (wanted.size > LogSource::kMostMessage) return false;
   reader.seek(wanted.offset);
   return reader.next(event);  // false if the file has changed
@@ -147,18 +147,18 @@ http::Bytes LogSource::history(const std::string& name, const std::string& list)
       channels.begin(), channels.end(),
       [&](const log::Index::Channel& channel) { return printable(channel.name) == name; });
   if (found == channels.end()) return nullptr;
-  const std::vector<log::Index::Entry>& entries = found->entries;
-  size_t all = 0;
-  for (const log::Index::Entry& entry : entries) all += entry.size;
-  const size_t every = 1 + std::max(entries.size() / kMostHistory, all / kMostForPlot);
+  const log::Places& places = found->places;
+  const size_t every =
+      1 + std::max(places.size() / kMostHistory, static_cast<size_t>(found->bytes) / kMostForPlot);
   std::vector<PlottedField> fields = plotted_fields(list);
   std::vector<double> numbers{static_cast<double>(every)};
   double last_s = -std::numeric_limits<double>::infinity();
   log::Event event;
-  for (size_t i = 0; i < entries.size();
-       i = i + 1 < entries.size() ? std::min(i + every, entries.size() - 1) : entries.size()) {
-    if (!read(reader_, entries[i], event)) continue;
-    const double time_s = static_cast<double>(entries[i].time_us) * 1e-6;
+  for (size_t i = 0; i < places.size();
+       i = i + 1 < places.size() ? std::min(i + every, places.size() - 1) : places.size()) {
+    const log::Place place = places[i];
+    if (!read(reader_, place, event)) continue;
+    const double time_s = static_cast<double>(place.time_us) * 1e-6;
     if (time_s <= last_s || !read_fields(event.data, fields)) continue;
     numbers.push_back(last_s = time_s);
     for (const PlottedField& field : fields)
@@ -226,7 +226,7 @@ void LogLook::show(Board& board) {
       forget(board, i);
       continue;
     }
-    size_t count = channels[i].count_until(time_us);
+    size_t count = channels[i].places.count_until(time_us);
     if (count == 0 && channels[i].fingerprint == world_info_t::getHash()) count = 1;
     if (count == shown_[i]) continue;
     if (bytes > LogSource::kMostAtATime / source_.looks_) {  // the others are shown next time
@@ -265,12 +265,12 @@ void LogLook::show_drawn(Board& board) {
 
 // The newest of that many messages; for one in parts, including the previous parts.
 size_t LogLook::load(Board& board, size_t channel, size_t count) {
-  const auto& entries = source_.index_.channels()[channel].entries;
+  const log::Places& places = source_.index_.channels()[channel].places;
   std::vector<std::vector<uint8_t>> parts;
   size_t bytes = 0;
   for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
     if (bytes > LogSource::kMostHeld) break;
-    if (!read(reader_, entries[entry - 1], event_)) break;
+    if (!read(reader_, places[entry - 1], event_)) break;
     parts.push_back(event_.data);
     bytes += event_.data.size();
     if (!board.is_later_part(parts.back())) break;
@@ -296,10 +296,10 @@ void LogLook::forget(Board& board, size_t channel) {
 Count LogLook::traffic(size_t channel) const {
   if (channel >= source_.index_.channels().size()) return {};
   const log::Index::Channel& of = source_.index_.channels()[channel];
-  const size_t count = of.count_until(now_us());
+  const size_t count = of.places.count_until(now_us());
   if (count == 0) return {};
   constexpr uint32_t kEventHead = 28;  // bytes before channel and data
-  return {count, of.entries[count - 1].size - kEventHead - static_cast<uint32_t>(of.name.size())};
+  return {count, of.places[count - 1].size - kEventHead - static_cast<uint32_t>(of.name.size())};
 }
 
 void LogLook::play(bool on, double speed) {
@@ -323,19 +323,13 @@ void LogLook::step(int states) {
   const auto found = std::find_if(channels.begin(), channels.end(), [](const auto& channel) {
     return channel.fingerprint == world_state_t::getHash();
   });
-  const auto& entries = (found == channels.end() ? channels.front() : *found).entries;
-  const SimTime now = now_us();
-  const auto after = [&](SimTime time_us) {
-    return std::upper_bound(
-        entries.begin(), entries.end(), time_us,
-        [](SimTime time, const log::Index::Entry& entry) { return time < entry.time_us; });
-  };
+  const log::Places& places = (found == channels.end() ? channels.front() : *found).places;
   playback_.playing = false;
-  auto at = after(states > 0 ? now : now - 1);
-  if (states > 0 && at == entries.end()) return seek(playback_.end_s);
-  if (states < 0 && at == entries.begin()) return seek(playback_.begin_s);
-  if (states < 0) --at;
-  seek(static_cast<double>(at->time_us) * 1e-6);
+  const size_t count = places.count_until(states > 0 ? now_us() : now_us() - 1);
+  if (states > 0 && count == places.size()) return seek(playback_.end_s);
+  if (states < 0 && count == 0) return seek(playback_.begin_s);
+  const SimTime time_us = places[states > 0 ? count : count - 1].time_us;
+  seek(static_cast<double>(time_us) * 1e-6);
 }
 
 }  // namespace ruedo::console

@@ -1,8 +1,8 @@
 // Where each message of a log is, by channel and time: gives random access to any moment of the
 // log.
 //
-// The log is read through once; of most messages only the place is kept. Times never go back: an
-// event whose time does is given the time of the event before it.
+// The log is read through once; of most messages only the place is kept, in a file (places.h).
+// Times never go back: an event whose time does is given the time of the event before it.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "log/places.h"
 #include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/log_header_t.hpp"
@@ -21,24 +22,18 @@ bool changes_world(int32_t kind);
 
 class Index {
  public:
-  static constexpr size_t kMostMessages =
-      20'000'000;  // 24 bytes each; what comes after them is not shown
   static constexpr size_t kMostChannels = 65'536;  // what is on others is not shown
   static constexpr size_t kMostEdits =
       1'000;  // requests that changed the world, and as many SET_POSE; later ones are not followed
 
-  struct Entry {
-    SimTime time_us;
-    int64_t offset;  // of the event in the file
-    uint32_t size;   // bytes of the file up to the next event
-  };
+  // Without places: what the log was made from and what changed its world, for those who read it
+  // from its beginning.
+  enum class Keeps { places, changes };
   struct Channel {
     std::string name;
     int64_t fingerprint = 0;  // of its first message
-    std::vector<Entry> entries;
-
-    // How many messages there are up to that time, itself included.
-    size_t count_until(SimTime time_us) const;
+    int64_t bytes = 0;        // of the file, by all of its messages
+    Places places;
   };
   struct Edit {
     SimTime time_us;
@@ -46,7 +41,7 @@ class Index {
   };
 
   // Throws InputError for what is no log, and for one without a message.
-  explicit Index(const std::string& path);
+  explicit Index(const std::string& path, Keeps keeps = Keeps::places);
 
   const std::vector<Channel>& channels() const { return channels_; }
   const std::optional<log_header_t>& header() const {
@@ -61,6 +56,7 @@ class Index {
  private:
   void add(const Event& event, int64_t offset, int64_t end, size_t channel);
 
+  Keeps keeps_;
   std::vector<Channel> channels_;
   std::optional<log_header_t> header_;
   std::vector<Edit> edits_;

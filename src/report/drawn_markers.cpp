@@ -149,8 +149,9 @@ DrawnMarkers::DrawnMarkers(const log::Index& index, const std::string& path) : r
   for (const log::Index::Channel& channel : index.channels()) {
     if (channel.fingerprint != markers_t::getHash() && channel.fingerprint != applied_t::getHash())
       continue;
-    for (const log::Index::Entry& entry : channel.entries)
-      places_.push_back({entry.time_us, entry.offset});
+    log::Places::Cursor cursor(channel.places);
+    while (const log::Place* place = cursor.next())
+      places_.push_back({place->time_us, place->offset});
   }
   std::ranges::stable_sort(
       places_, {}, [](const Place& place) { return std::pair{place.time_us, place.offset}; });

@@ -30,6 +30,7 @@ constexpr Size kDefaultSize{1280, 720};
 constexpr int kMostSide = 3840, kMostFrames = 100'000;
 constexpr uint32_t kMostMessage = 1u << 20;
 constexpr int kMostParts = 256;
+constexpr int32_t kMostBodies = 20'000'000;  // of a state that is not trusted
 constexpr double kJump_m = 1.5;      // farther between two states is a new place, and no motion
 constexpr double kFollowed_m = 5.0;  // from a robot that is followed
 
@@ -46,19 +47,19 @@ class States {
 
   // Bodies that are not in the states stay as they are in the snapshot.
   void show(SimTime time_us, Snapshot& snapshot) {
-    const size_t count = std::max<size_t>(channel_->count_until(time_us), 1);
+    const size_t count = std::max<size_t>(channel_->places.count_until(time_us), 1);
     if (count != count_) {
       const bool next = count == next_ && !after_.empty();
       before_ = next ? std::exchange(after_, {}) : state(count);
       // All parts of the next one have one time.
-      next_ = count < channel_->entries.size()
-                  ? channel_->count_until(channel_->entries[count].time_us)
+      next_ = count < channel_->places.size()
+                  ? channel_->places.count_until(channel_->places[count].time_us)
                   : 0;
       after_ = state(next_);
       count_ = count;
     }
-    const SimTime from = channel_->entries[count - 1].time_us;
-    const SimTime to = count < channel_->entries.size() ? channel_->entries[count].time_us : from;
+    const SimTime from = channel_->places[count - 1].time_us;
+    const SimTime to = count < channel_->places.size() ? channel_->places[count].time_us : from;
     const double share =
         to > from ? std::clamp(static_cast<double>(time_us - from) / static_cast<double>(to - from),
                                0.0, 1.0)
@@ -83,7 +84,7 @@ class States {
   State state(size_t count) {
     State found;
     for (int parts = 0; count > 0 && parts < kMostParts; --count, ++parts) {
-      const log::Index::Entry& entry = channel_->entries[count - 1];
+      const log::Place entry = channel_->places[count - 1];
       if (entry.size > kMostMessage) break;
       reader_.seek(entry.offset);
       world_state_t part;
@@ -98,8 +99,7 @@ class States {
 
   static void add(const world_state_t& part, State& state) {
     for (size_t i = 0; i < part.index.size(); ++i) {
-      if (part.index[i] < 0 || static_cast<size_t>(part.index[i]) >= log::Index::kMostMessages)
-        continue;
+      if (part.index[i] < 0 || part.index[i] >= kMostBodies) continue;
       const auto body = static_cast<size_t>(part.index[i]);
       if (body >= state.size()) state.resize(body + 1);
       const auto& p = part.position[i];

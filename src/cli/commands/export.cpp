@@ -1,6 +1,7 @@
 // ruedo export: a log as an MCAP file with Foxglove's message types, or as a ROS 2 bag.
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include <fmt/format.h>
@@ -31,17 +32,28 @@ uint64_t nanoseconds(SimTime time_us) {
   return static_cast<uint64_t>(std::max(time_us, SimTime{0})) * 1000;
 }
 
-// Passes every message to `out`, and tells it when another world begins. Returns the number of
-// messages.
+// So many bytes of a log foretell how large the whole will be.
+constexpr int64_t kForetells = int64_t{16} << 20;
+
+// Passes every message to `out`, and tells it when another world begins. size: of the file so far.
+// Returns the number of messages.
 template <class Export>
 uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds,
-                  Export& out) {
+                  Export& out, const std::function<uint64_t()>& size) {
   log::Reader log(path, "exporting");
   const run::LogWorlds::Scene* scene = nullptr;
   log::Event event;
   SimTime now_us = index.begin_us();
   uint64_t read = 0;
+  bool told = log.size() < 4 * kForetells;
   while (log.next(event)) {
+    if (!told && log.offset() > kForetells) {
+      told = true;
+      const double share = static_cast<double>(size()) / static_cast<double>(log.offset());
+      to_stderr("ruedo: {} of {:.1f} GB: what is written will be about {:.1f} GB\n", path,
+                static_cast<double>(log.size()) * 1e-9,
+                share * static_cast<double>(log.size()) * 1e-9);
+    }
     now_us = std::max(now_us, event.timestamp_us);  // as in the index: times never go back
     if (const auto* next = &worlds.at(now_us); next != scene) {
       scene = next;
@@ -68,7 +80,7 @@ void export_bag(const ExportArguments& arguments, const log::Index& index,
   options.channels = logged.remaps;
   options.topics = parse_remaps(arguments.remaps);
   ros2::Rosbag bag(without_slash(arguments.bag), options);
-  const uint64_t read = read_log(arguments.log, index, worlds, bag);
+  const uint64_t read = read_log(arguments.log, index, worlds, bag, [&] { return bag.size(); });
   bag.finish(index.header(), arguments.log);
   fmt::print(
       "{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message "
@@ -81,7 +93,8 @@ void export_foxglove(const ExportArguments& arguments, const log::Index& index,
   log::McapWriter out(arguments.out);
   foxglove::FoxgloveFile file(out);
   foxglove::FoxgloveExport exported(file);
-  const uint64_t read = read_log(arguments.log, index, worlds, exported);
+  const uint64_t read =
+      read_log(arguments.log, index, worlds, exported, [&] { return out.size(); });
   out.finish();
   fmt::print("{}: {} messages of {}, as {} of Foxglove's and Ruedo's types", arguments.out, read,
              arguments.log, out.messages());
@@ -99,7 +112,7 @@ int export_log(const ExportArguments& arguments) {
   if (arguments.sandboxed)
     enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
   const SignalThread signals;
-  const log::Index index(arguments.log);
+  const log::Index index(arguments.log, log::Index::Keeps::changes);
   run::LoggedRun logged;
   const run::LogWorlds worlds(
       index, [&](const log_header_t& header) { return logged = load_run(header, arguments.log); });

@@ -43,7 +43,7 @@ PlayedRun::~PlayedRun() { bus_.stop(); }
 
 // Of a run of Ruedo's; any other log of LCM is played as it is.
 void PlayedRun::make_worlds(const std::string& path) {
-  const log::Index index(path);
+  const log::Index index(path, log::Index::Keeps::changes);
   if (!index.header()) return;
   worlds_ = std::make_unique<run::LogWorlds>(
       index, [&](const log_header_t& header) { return load_run(header, path); });

@@ -48,6 +48,8 @@ class Rosbag {
   static constexpr size_t kMostAttachments = 10'001;  // the files of a log's header, and kRest
 
   uint64_t messages() const { return out_->messages(); }
+  // Bytes of the bag so far, with those of the rest that is attached at its end.
+  uint64_t size() const { return out_->size() + static_cast<uint64_t>(rest_->size()); }
   uint64_t left_out() const { return left_out_; }
 
  private:
