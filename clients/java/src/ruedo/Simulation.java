@@ -261,8 +261,7 @@ public final class Simulation extends Requests implements AutoCloseable {
     private long awaitMultiple(long period, long[] next) {
         checkOpen();
         if (lockstep())
-            throw new RuedoException.NotSupported(
-                    "in lockstep, only sim.step(n) advances time");
+            throw new RuedoException.NotSupported("in lockstep, only sim.step(n) advances time");
         long begin = clock.utime();
         long following = (begin / period + 1) * period;
         boolean inTime = begin < next[0] + period && next[0] + period <= following;
