@@ -181,7 +181,7 @@ def test_no_process_stays(tmp_path):
         wait_for(lambda process=process: not os.path.exists(f"/proc/{process}"))
 
 
-def test_what_a_repeated_program_leaves_behind_is_ended(tmp_path):
+def test_processes_that_a_repeated_program_leaves_are_ended(tmp_path):
     """Regression: it was in a campaign alone."""
     command = "echo $$ > child; exec sleep 1000"
     (tmp_path / "leave.sh").write_text(command)
@@ -202,7 +202,7 @@ def drive(view):
 
 
 @pytest.mark.parametrize("which", ["controller.py", "lib.py", "w.sdf"])
-def test_what_runs_while_its_file_is_edited_is_no_result(folder, which):
+def test_a_run_whose_file_is_edited_meanwhile_gives_no_result(folder, which):
     """Regression: it was stored as one of the file that had been there before."""
     from ruedo import World
 
@@ -262,7 +262,7 @@ def prints(view):
 """
 
 
-def test_output_that_nobody_has_looked_at_is_told_as_bounded(tmp_path, monkeypatch):
+def test_output_that_was_cut_is_reported_as_cut(tmp_path, monkeypatch):
     """A controller that prints much and ends at once is over before the next look at the file."""
     monkeypatch.setattr(output, "_LOOK_S", 100.0)
     said = output.Output(str(tmp_path / "output"))
@@ -276,7 +276,7 @@ def blocks_bytes(descriptor):
     return os.fstat(descriptor).st_blocks * 512
 
 
-def test_what_is_printed_while_its_file_is_bounded_is_kept(tmp_path, monkeypatch):
+def test_output_during_a_cut_is_kept(tmp_path, monkeypatch):
     """Regression: what came between the look at the file and the cut was lost."""
     free = output._fallocate
 

@@ -146,7 +146,7 @@ limits: {duration: 2}
 '''
 
 
-def test_a_controller_stands_until_what_it_reads_has_come(tmp_path):
+def test_a_controller_waits_for_the_first_sample_that_it_reads(tmp_path):
     (tmp_path / "waits.py").write_text(WAITS)
     (tmp_path / "c.yaml").write_text(UNTIL_THE_FIRST_SCAN)
     results = Campaign(tmp_path / "c.yaml").run(workers=1)

@@ -378,12 +378,12 @@ WRONG = [
 
 
 @pytest.mark.parametrize("text,says", WRONG)
-def test_wrong_ones_are_told(text, says):
+def test_wrong_faults_are_reported(text, says):
     with pytest.raises(ValueError, match=says):
         client.Engine("hall", text=HALL, disable=DISABLED, fault=[text])
 
 
-def test_wrong_ones_from_a_program_are_told():
+def test_wrong_faults_from_a_program_are_reported():
     engine = client.Engine("hall", text=HALL, disable=DISABLED)
     with pytest.raises(ValueError, match="p3at/fault: kind 'burn' is not allowed"):
         engine.command(0, "p3at/fault", message("burn"))

@@ -283,7 +283,7 @@ BROKEN = {  # and what is said of it
 
 
 @pytest.mark.parametrize("harm", BROKEN)
-def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
+def test_why_reports_the_damage_of_a_log(tmp_path, harm):
     """Regressions: but for the second, which ran for ever, they gave a traceback."""
     log, bad = tmp_path / "run.lcm", tmp_path / "bad.lcm"
     options = ["--rate", "max", "--duration", "2", "--lcm", "memq://", "--record", str(log)]
@@ -336,7 +336,7 @@ def test_a_kept_program_runs_in_its_folder_and_is_run_anew_when_it_changes(tmp_p
     assert made["python"] == "json:dumps"
 
 
-def test_a_sound_controller_is_told_to_be_one(example):
+def test_a_sound_controller_passes_its_hunt(example):
     assert hunt(example("", "hunt-faults.yaml"), "--cases", "16", code=0) == {
         "found": False,
         "cases": 16,
@@ -419,7 +419,7 @@ def blind(folder, name="ahead", text="", **hunt):
 
 
 @pytest.mark.parametrize("obstacles", [{}, {"obstacles": AWAY}], ids=["plain", "obstacles"])
-def test_what_a_world_includes_goes_with_it(tmp_path, obstacles):
+def test_included_files_are_kept_with_a_world(tmp_path, obstacles):
     """Regressions: a world with obstacles, and one that was kept, was without it: the kept test
     passed at once.
     """
@@ -433,7 +433,7 @@ def test_what_a_world_includes_goes_with_it(tmp_path, obstacles):
 
 
 @pytest.mark.parametrize("world", ["w.sdf", "empty"])
-def test_the_robots_file_goes_with_what_is_kept(tmp_path, world):
+def test_the_robots_file_is_kept_with_a_find(tmp_path, world):
     """Regression: what was kept named a robot that is elsewhere."""
     sensor = "<sensor name='imu' type='imu'/></link>"  # which makes it a robot
     robot = BOX.replace("<static>true</static>", "").replace("</link>", sensor)
@@ -449,7 +449,7 @@ def test_the_robots_file_goes_with_what_is_kept(tmp_path, world):
     assert (folder / "kept/box/own/cart.sdf").read_text() == robot
 
 
-def test_what_is_kept_and_does_not_fail_again_is_told(tmp_path):
+def test_a_kept_case_that_does_not_fail_again_is_reported(tmp_path):
     """And the find is not lost."""
     folder = blind(tmp_path, "once")
     (folder / "blind.py").write_text(
@@ -539,7 +539,7 @@ WRONG = [  # more of the file, its `hunt`, what the message says
 
 
 @pytest.mark.parametrize("text, members, said", WRONG)
-def test_a_wrong_hunt_is_told_with_file_and_line(tmp_path, text, members, said):
+def test_a_wrong_hunt_is_reported_with_file_and_line(tmp_path, text, members, said):
     """Regressions: tracebacks, hunts without end for what cannot be found, and parameters that
     took the place of what the hunt chose.
     """
@@ -548,7 +548,7 @@ def test_a_wrong_hunt_is_told_with_file_and_line(tmp_path, text, members, said):
     assert done.count("\n") == 1 and re.search(rf"hunt.yaml:\d+: .*{said}", done), done
 
 
-def test_a_parameter_may_be_called_as_what_belongs_to_a_fault(tmp_path):
+def test_a_parameter_may_have_the_name_of_a_faults_member(tmp_path):
     """Regression: its ends were left out, and it was not told."""
     folder = blind(tmp_path, "careless", text="parameters: {fault_rate: {uniform: [0, 1]}}")
     assert hunt(folder, "--cases", "4", "--shrink", "0")["choices"]["fault_rate"] == 1.0

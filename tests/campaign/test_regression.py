@@ -111,7 +111,7 @@ def plain(given):
 
 
 @pytest.mark.parametrize("given, text", WRONG, ids=plain)
-def test_a_wrong_argument_is_told(tmp_path, given, text):
+def test_a_wrong_argument_is_reported(tmp_path, given, text):
     """Regression: a text counted as its letters, of which `*` ignored everything, and what was
     expected without a goal was left out.
     """
@@ -175,7 +175,7 @@ def test_a_run_that_fails_is_returned_where_that_is_expected(tmp_path):
     ],
     ids=plain,
 )
-def test_what_was_not_run_is_no_failure_that_was_expected(tmp_path, given, text):
+def test_a_run_that_did_not_start_is_not_an_expected_failure(tmp_path, given, text):
     rest = {"world": "arena", "duration": 1, "record": tmp_path / "run.lcm", "check": False}
     with pytest.raises(RegressionFailed, match=text):
         run_regression(**{**rest, **given})
@@ -277,7 +277,7 @@ def test_a_client_that_hangs_is_ended_with_its_run(tmp_path):
     assert not os.path.exists(f"/proc/{(tmp_path / 'child').read_text().strip()}")
 
 
-def test_who_keeps_a_regressions_output_open_keeps_nobody_waiting(tmp_path):
+def test_a_process_that_keeps_the_output_open_delays_no_regression(tmp_path):
     """A client that leaves its run, and heeds nothing."""
     client = (
         "setsid sh -c 'trap \"\" TERM HUP; echo $$ > child; sleep 1000; sleep 1000' & sleep 1000"

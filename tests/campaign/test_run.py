@@ -130,7 +130,7 @@ def ids(folder, file="c.yaml"):
     return [case.id for case in Campaign(folder / file).cases]
 
 
-def test_what_lies_beside_a_controller_counts(folder):
+def test_files_beside_a_controller_count_as_inputs(folder):
     """Every file, but for what Ruedo itself writes there."""
     before = ids(folder)
     ruedo("campaign", "export", "c.yaml", "-o", "table.csv", folder=folder)
@@ -167,7 +167,7 @@ def test_what_lies_beside_a_controller_counts(folder):
     assert ids(folder) == before
 
 
-def test_what_a_controller_writes_beside_itself_is_no_input(folder):
+def test_files_that_a_controller_writes_are_not_inputs(folder):
     (folder / "controller.py").write_text(
         CONTROLLER + "\n\nwith open(__file__ + '.log', 'a') as log:\n    log.write('loaded')\n"
     )
@@ -179,7 +179,7 @@ def test_what_a_controller_writes_beside_itself_is_no_input(folder):
         assert "8 of 8 cases" in done.stdout and not done.stderr, done
 
 
-def test_why_results_no_longer_stand_is_told(folder):
+def test_the_reason_why_results_are_outdated_is_printed(folder):
     """A picture that lies beside the controller may be read by it."""
     campaign = Campaign(folder / "c.yaml", out=folder / "other.campaign")
     assert campaign.changes() == []
@@ -202,7 +202,7 @@ def test_why_results_no_longer_stand_is_told(folder):
 @pytest.mark.parametrize(
     "count, size, says", [(2001, 0, "2000 files"), (1, (256 << 20) + 1, "256 MB")]
 )
-def test_a_folder_that_is_too_large_is_told(folder, count, size, says):
+def test_a_folder_that_is_too_large_is_reported(folder, count, size, says):
     (folder / "data").mkdir()
     for i in range(count):
         with (folder / f"data/{i}.npy").open("wb") as file:
@@ -520,7 +520,7 @@ def test_two_campaigns_compared(whole):
     assert found.p == 0.5 and found.change[0] == pytest.approx(0.25)
 
 
-def test_what_became_worse_has_an_exit_code(whole):
+def test_worse_cases_have_an_exit_code(whole):
     """Regressions: "1 worse" was 0, where p was large; and a shard that was started in the folder
     of a whole campaign made everybody forget its other cases."""
     folder, _ = whole
@@ -727,7 +727,7 @@ def test_damaged_results_are_named_in_one_line(results, damage):
         assert "damaged" in said or "is of format" in said, said
 
 
-def test_a_file_of_results_that_is_none_is_named(results):
+def test_an_invalid_results_file_is_reported(results):
     folder, file, _ = results
     content = file.read_bytes()
     for wrong in (b"SQLite format 3\0" + bytes(200), content[:5000], b"x" * 5000):
@@ -742,7 +742,7 @@ def test_a_file_of_results_that_is_none_is_named(results):
     assert "not a regular file" in done.stderr
 
 
-def test_a_log_of_somebody_elses_that_is_none_is_not_waited_for(results):
+def test_a_fifo_in_place_of_a_log_is_not_waited_for(results):
     folder, _, _ = results
     log = next((folder / "other/logs").iterdir())
     log.unlink()
@@ -766,7 +766,7 @@ def measure(log):
 '''
 
 
-def test_what_a_controller_says_stays_one_line_everywhere(tmp_path):
+def test_a_controllers_error_stays_one_line_everywhere(tmp_path):
     """Also in the test that a hunt keeps, which was no Python and no YAML any more."""
     folder = tmp_path / "with a space"
     folder.mkdir()
@@ -798,7 +798,7 @@ def test_a_file_that_cannot_be_written_is_named(whole, words):
     assert done.stderr == "ruedo: nowhere/t.csv: No such file or directory\n"
 
 
-def test_a_command_never_writes_over_what_it_reads(whole):
+def test_a_command_never_overwrites_its_input(whole):
     folder, expected = whole
     log = next((folder / "c.campaign/logs").iterdir()).relative_to(folder)
     linked = folder / "linked.csv"
@@ -834,7 +834,7 @@ def test_a_command_never_writes_over_what_it_reads(whole):
         ("run", "c.yaml", "--quiet", "--junit", "full/t.xml"),
     ],
 )
-def test_what_is_there_outlives_a_full_disk(whole, words):
+def test_existing_files_outlive_a_full_disk(whole, words):
     folder, _ = whole
     (folder / "full").mkdir(exist_ok=True)
     kept = "number,id,world,robot,controller,seed,kept"  # as what it replaces begins
@@ -882,7 +882,7 @@ def test_slurm(whole):
     assert done.returncode == 0 and results_in(folder / "c.campaign.shard2") == 2
 
 
-def test_what_compares_with_no_results_is_told(whole):
+def test_comparing_with_no_results_is_reported(whole):
     folder, _ = whole
     (folder / "empty").mkdir(exist_ok=True)
     done = ruedo("campaign", "compare", "c.yaml", "empty", folder=folder, code=3)

@@ -210,7 +210,7 @@ WRONG = [  # what is replaced, by what, line, what the message says
 
 
 @pytest.mark.parametrize("old,new,line,text", WRONG)
-def test_a_wrong_file_is_told_with_line_and_what_is_allowed(folder, old, new, line, text):
+def test_a_wrong_file_is_reported_with_line_and_allowed_values(folder, old, new, line, text):
     assert old in CAMPAIGN
     (folder / "c.yaml").write_text(CAMPAIGN.replace(old, new, 1))
     with pytest.raises(SpecError, match=text) as caught:
@@ -232,7 +232,7 @@ NAMES = [  # what only a loaded world knows: a line of the file, what is said
 
 
 @pytest.mark.parametrize("line, says", NAMES, ids=[line for line, _ in NAMES])
-def test_what_a_world_does_not_have_is_told_before_the_first_run(folder, line, says):
+def test_names_that_a_world_lacks_are_reported_before_the_first_run(folder, line, says):
     """Regression: each case was invalid, and none said where."""
     golden = folder / "g.lcm"
     ruedo(*("run", "arena", "--rate", "max", "--duration", 1, "--record", golden), folder=folder)
@@ -284,7 +284,7 @@ def test_a_hostile_file_is_refused_at_once(folder, content, text):
     assert text in done.stderr and done.stderr.count("\n") == 1 and "\x1b" not in done.stderr
 
 
-def test_a_python_without_what_it_takes_is_told_in_one_line(folder):
+def test_a_missing_python_package_is_reported_in_one_line(folder):
     import os
 
     (folder / "python").write_text("#!/bin/sh\nexec python3 -S \"$@\"\n")  # no site-packages
@@ -309,7 +309,7 @@ def test_a_python_without_what_it_takes_is_told_in_one_line(folder):
     assert "'/nowhere' cannot be started (No such file or directory)" in done.stderr
 
 
-def test_a_generator_that_ends_the_program_is_told(folder):
+def test_a_generator_that_ends_the_program_is_reported(folder):
     (folder / "world.py").write_text("import sys\nsys.exit()\n")
     assert (
         "walls(distance=1.2) raised SystemExit"
@@ -348,7 +348,7 @@ print(WorldFiles(Path(), Path("made")).sha256("w.sdf", ""))"""
         ("slurm", "c.yaml", "--time", "1\nrm"),
     ],
 )
-def test_wrong_options_are_told_with_what_is_allowed(folder, words):
+def test_wrong_options_are_reported_with_allowed_values(folder, words):
     said = ruedo("campaign", *words, folder=folder, code=2).stderr
     assert "allowed is" in said or "it looks like" in said
 
@@ -421,7 +421,7 @@ def test_intervals_and_tests_of_counts():
     assert (other, low2, high2) == pytest.approx((-change, -high, -low))
 
 
-def test_a_shard_without_a_case_is_told(folder):
+def test_a_shard_without_a_case_is_reported(folder):
     """Regression: nothing was run, and all was well."""
     said = ruedo("campaign", "run", "c.yaml", "--shard", "9/9", folder=folder, code=3).stderr
     assert said == "ruedo: --shard 9/9: there are 8 cases, and none is in it\n"
@@ -430,12 +430,12 @@ def test_a_shard_without_a_case_is_told(folder):
 
 
 @pytest.mark.parametrize("shard", ["9" * 5000 + "/" + "9" * 5000, "0/2", "3/2", "1/2/3"], ids=len)
-def test_a_wrong_shard_is_told(folder, shard):
+def test_a_wrong_shard_is_reported(folder, shard):
     said = ruedo("campaign", "run", "c.yaml", "--shard", shard, folder=folder, code=3).stderr
     assert said.count("\n") == 1 and "it looks like I/N" in said
 
 
-def test_a_file_whose_name_is_no_text_is_told(folder):
+def test_a_file_name_that_is_not_utf8_is_reported(folder):
     """Regression: it came to light when the results were written, and they were not."""
     (folder / os.fsdecode(b"stud\xffent.py")).write_text("def ahead(view):\n    return 'done'\n")
     text = CAMPAIGN.replace("name: ahead", "name: ahead, each: 'stud*.py'")
@@ -489,16 +489,16 @@ def test_a_number_with_an_exponent_is_one(text):
 
 
 @pytest.mark.parametrize("text", ["1e", "e9", "1e9s", "1e9.5", "a1e9", "1 e9", "v1e9", "."])
-def test_what_is_no_number_stays_a_text(text):
+def test_text_that_is_not_a_number_stays_text(text):
     assert parse_yaml(f"[{text}]")[1] == [text]
 
 
-def test_what_is_written_as_yaml_is_read_as_the_same():
+def test_written_yaml_reads_as_the_same_value():
     content = {"1e9": ["1e9", 1e9, 1e22, 1e-9, 7, "7", True, "true", None, "caf\u00e9", 0.1]}
     assert parse_yaml(dump_yaml(content))[1] == content
 
 
-def test_a_command_that_names_no_file_is_told(folder):
+def test_a_command_that_names_no_file_is_reported(folder):
     text = CAMPAIGN.replace('python: "controller.py:ahead"', 'command: "true", lockstep: 1')
     (folder / "c.yaml").write_text(text)
     said = ruedo("campaign", "run", "c.yaml", folder=folder, code=1).stderr

@@ -214,7 +214,7 @@ print(subprocess.run([ruedo, "doctor", "--lcm", url], capture_output=True, text=
 """
 
 
-def test_lost_datagrams_are_told_with_their_cure():
+def test_lost_datagrams_are_reported_with_their_cure():
     network = "ip link set lo up multicast on; ip route add 239.255.76.67/32 dev lo; "
     isolated = ["unshare", "-rn", "sh", "-ec"]
     if subprocess.run([*isolated, network], capture_output=True).returncode != 0:

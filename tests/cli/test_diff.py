@@ -128,7 +128,7 @@ def test_a_log_that_is_cut_is_the_same_as_none(logs, tmp_path):
     assert diff(logs[0], cut, "--partial").returncode == 1
 
 
-def test_what_cannot_be_read_is_said(logs, tmp_path):
+def test_unreadable_logs_are_reported(logs, tmp_path):
     done = diff(*logs, "--tolerance", "r/pose=abs:much")
     assert done.returncode == 2 and "much" in done.stderr
     done = diff(logs[0], tmp_path / "nowhere.lcm")

@@ -102,7 +102,7 @@ def test_a_damaged_log(written):
     assert told["messages"] == 104
 
 
-def test_an_empty_log_and_what_is_none(tmp_path):
+def test_an_empty_log_and_a_file_that_is_not_a_log(tmp_path):
     empty = tmp_path / "empty.lcm"
     empty.write_bytes(b"")
     assert info(empty).returncode != 0  # no world, either

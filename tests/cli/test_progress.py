@@ -102,7 +102,7 @@ def test_it_says_how_far_it_is(name, commands):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_quiet_and_pipes_are_told_nothing(name, commands):
+def test_quiet_and_pipes_show_no_progress(name, commands):
     words, _ = commands[name]
     done = subprocess.run(
         [str(word) for word in (RUEDO, *words)],
@@ -128,7 +128,7 @@ def test_the_part_that_is_done_grows(log):
     assert code == 0 and parts and parts == sorted(parts) and parts[-1] > parts[0], said
 
 
-def test_what_is_soon_done_has_no_line(log):
+def test_a_short_command_shows_no_progress(log):
     code, said = on_terminal("diff", log, log, after="60000")
     assert code == 0 and "\x1b" not in said
 

@@ -149,7 +149,7 @@ def test_a_golden_log_outlives_a_full_disk(folder):
 
 
 @pytest.mark.parametrize("keep", [[], ["--keep", "nosuch"]], ids=str)
-def test_what_failed_is_told_whatever_the_golden_log_says(folder, keep):
+def test_a_failure_is_reported_whatever_the_golden_log_says(folder, keep):
     """Regression: `--keep */pose: no message is on such a channel` was all that was said of a
     client that had failed at once.
     """

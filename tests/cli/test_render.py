@@ -308,7 +308,7 @@ def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
     assert earlier.read_bytes() == b"an earlier video"
 
 
-def test_a_damaged_log_is_told(log, tmp_path):
+def test_a_damaged_log_is_reported(log, tmp_path):
     damaged = tmp_path / "damaged.lcm"
     content = Path(log).read_bytes()
     damaged.write_bytes(content[: len(content) // 2] + bytes(5000))

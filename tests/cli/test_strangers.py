@@ -331,7 +331,7 @@ def test_limits_of_the_shell_are_named(kind, value, words, command, recorded):
 
 
 @pytest.mark.parametrize("name", COSTLY)
-def test_what_costs_much_is_refused(name, tmp_path):
+def test_expensive_files_are_refused(name, tmp_path):
     file, content, arguments, words = COSTLY[name]
     (tmp_path / file).write_bytes(content)
     result = program(

@@ -53,7 +53,7 @@ def test_a_closed_stream_is_no_file_of_ours(world, log, tmp_path, closed):
 
 @pytest.mark.parametrize("command", ["check", "info"])
 @pytest.mark.parametrize("options", [[], ["--json"]])
-def test_what_cannot_be_printed_is_said(world, command, options):
+def test_a_full_standard_output_is_reported(world, command, options):
     result = shell("> /dev/full", command, world, *options)
     assert result.returncode == 4 and result.stderr.count(b"\n") == 1, result
     assert b"No space left" in result.stderr
@@ -135,7 +135,7 @@ def test_a_name_cannot_speak_to_the_terminal(world, log, tmp_path, odd):
     assert program("check", os.fsdecode(latin), errors="replace").returncode == 0
 
 
-def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
+def test_no_command_overwrites_its_input(world, log, tmp_path):
     map_file = tmp_path / "map.yaml"
     assert program("map", world, "-o", map_file).returncode == 0
     linked = tmp_path / "linked.lcm"
@@ -345,7 +345,7 @@ def test_a_picture_of_gigabytes_is_not_read(tmp_path):
         ("v.webm", ["render", "LOG", "--size", "64x64", "--video"]),
     ],
 )
-def test_what_is_there_outlives_a_full_disk(world, log, tmp_path, name, arguments):
+def test_existing_files_outlive_a_full_disk(world, log, tmp_path, name, arguments):
     places = {"WORLD": str(world), "LOG": str(log)}
     arguments = [places.get(each, each) for each in arguments]
     disk = tmp_path / "disk"

@@ -227,7 +227,7 @@ def test_a_robot_that_stands_in_a_wall_is_named(x, stuck, tmp_path):
         "run w.sdf --rate",
     ],
 )
-def test_what_is_no_number_is_named(words, value, tmp_path):
+def test_a_value_that_is_not_a_number_is_reported(words, value, tmp_path):
     """A NaN lies in no range: an expectation with it would hold, a map be cut nowhere."""
     done = subprocess.run(
         [RUEDO, *words.split(), value], capture_output=True, text=True, cwd=tmp_path, timeout=60

@@ -315,7 +315,7 @@ def test_another_build_of_the_same_sources_is_no_excuse(tmp_path):
         )
 
 
-def test_what_is_no_recording(tmp_path):
+def test_files_without_a_recording_are_refused(tmp_path):
     (tmp_path / "empty.lcm").write_bytes(b"")
     (tmp_path / "text.lcm").write_text("hello, world")
     write(tmp_path / "other.lcm", [(0, "A", b"x")])

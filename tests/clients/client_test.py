@@ -117,7 +117,7 @@ def test_primitives(language, server):
     assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
 
 
-def test_primitives_of_two_clients_are_told_apart(language, server):
+def test_primitives_of_two_clients_are_reported_apart(language, server):
     """Of two in a process, and of a program that is started again under its name."""
     said = probe(language, server.url, "apart", "p3at")
     for who in "unnamed", "driver":
@@ -166,7 +166,7 @@ def test_what_cannot_move_sideways_is_not_told_to(language, server):
     assert said.one("none") == "none"
 
 
-def test_what_moves_sideways_is_told_to(language):
+def test_what_moves_sideways_is_reported_to(language):
     with ruedo_run("--spawn", "mecanum:m@0,0", world="empty") as server:
         said = probe(language, server.url, "sideways", "m")
     assert [said.one(what) for what in ("command", "velocity", "none")] == 3 * ["none"]

@@ -55,7 +55,7 @@ def test_callbacks_and_closing():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_misuse_is_told_at_once():
+def test_misuse_is_reported_at_once():
     done = lifetimes("misused")
     assert done.stdout.splitlines() == [
         "waits 7 of 7",
@@ -284,7 +284,7 @@ def test_a_primitive_is_sent_until_a_status_shows_it():
     assert internals("resends") == ["again true"] * 4 + ["shown true"]
 
 
-def test_a_server_is_told_how_far_its_client_has_come():
+def test_a_server_is_reported_how_far_its_client_has_come():
     assert internals("progress") == [
         f"first 0 0 {NEVER}",
         f"received 0 25000 {NEVER}",

@@ -253,7 +253,7 @@ def test_a_robot_without_a_drive_has_faults():
         assert [scan.ranges.max() for scan in seen.all(robot.lrf)] == [math.inf] + 5 * [0.5]
 
 
-def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
+def test_who_waits_in_lockstep_is_reported_that_steps_are_wanted():
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
         robot = sim.robot("p3at")
         with pytest.raises(ruedo.Timeout, match=r"in lockstep.*sim\.step\(20\)\.latest\(robot"):
@@ -518,7 +518,7 @@ def test_a_callback_of_a_new_run_may_close_the_simulation(caplog):
     ]
 
 
-def test_a_callback_that_waits_is_told_so_at_once():
+def test_a_callback_that_waits_is_reported_so_at_once():
     with ruedo.launch(HALL, **QUICK) as sim:
         robot, said, done = sim.robot("p3at"), [], threading.Event()
         motion = robot.advance(0.1, speed=0.001)
@@ -622,7 +622,7 @@ def test_a_close_that_is_interrupted_leaves_nothing_open(monkeypatch):
     assert not sim._connection.bus._thread.is_alive()
 
 
-def test_the_child_of_a_fork_is_told():
+def test_the_child_of_a_fork_is_reported():
     with ruedo.launch(HALL, **QUICK) as sim:
         reader, writer = os.pipe()
         child = os.fork()
@@ -942,7 +942,7 @@ WRONG = [
 ]
 
 
-def test_what_is_wrong_is_told_in_a_line_of_our_own():
+def test_what_is_wrong_is_reported_in_a_line_of_our_own():
     """Each call with each wrong argument: it is taken, or one line names what is wrong."""
     with ruedo.launch(HALL, **QUICK) as sim:
         robot, inner = sim.robot("p3at"), []

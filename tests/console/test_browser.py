@@ -292,7 +292,7 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
     } <= set(seen)
 
 
-def test_what_happens_in_a_run_is_told(crash, tmp_path):
+def test_what_happens_in_a_run_is_reported(crash, tmp_path):
     with running(world=crash) as process:
         seen = browse(process.url, tmp_path, "events")
     assert {
@@ -770,7 +770,7 @@ def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
         browse(process.url, tmp_path, "log", given)
 
 
-def test_a_server_that_does_not_answer_is_told(tmp_path):
+def test_a_server_that_does_not_answer_is_reported(tmp_path):
     with running() as process, browser(process.url, tmp_path, "silent") as page:
         said = []
         for line in page.stdout:

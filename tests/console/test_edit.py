@@ -215,7 +215,7 @@ def comes_to_know(process, utime):
     viewer.close()
 
 
-def test_who_comes_late_to_a_run_that_stands_is_told_how_it_stands(tmp_path):
+def test_who_comes_late_to_a_run_that_stands_is_reported_how_it_stands(tmp_path):
     import ruedo
 
     with running("--paused", "--disable", "p3at/camera") as process:

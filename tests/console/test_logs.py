@@ -229,7 +229,7 @@ def event(number, time_us, channel, data):
 
 
 @pytest.mark.parametrize("count, every", [(1, 1), (3, 1), (150_000, 2), (200_001, 3)])
-def test_a_field_is_told_over_the_whole_log(tmp_path, count, every):
+def test_a_field_is_reported_over_the_whole_log(tmp_path, count, every):
     """Its first and its last message are always there; of many every so many."""
     from ruedo.lcmtypes import odometry_t
 
@@ -256,7 +256,7 @@ def test_a_field_is_told_over_the_whole_log(tmp_path, count, every):
             assert get(process.port, f"/history/{none}")[0] in (200, 404)
 
 
-def test_fields_are_told_together_and_arrays_as_a_whole(tmp_path):
+def test_fields_are_reported_together_and_arrays_as_a_whole(tmp_path):
     """Of the finite elements; where there are none, and of fields that there are not, nothing."""
     from ruedo.lcmtypes import planar_lidar_t
 

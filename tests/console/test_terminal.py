@@ -480,7 +480,7 @@ def test_teleop_is_suspended_by_its_key_and_goes_on_in_a_window_of_another_size(
 
 
 @pytest.mark.parametrize("begin", ['"$0" "$@" &', '"$0" "$@";', '"$0" "$@"; bg;'])
-def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_when_it_is_told(begin):
+def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_when_it_is_reported(begin):
     """As `kill %1` tells it: TERM and then CONT."""
     script = f"set -m; {begin} job=$(jobs -p); echo job $job.; read; wait $job; echo ended $?"
     with Teleop(script=script) as teleop:

@@ -92,7 +92,7 @@ def test_what_has_not_come_since_a_reset_is_not_the_run_befores():
         assert np.isfinite(ranges).all() and e.observe("scan.ranges").shape == (2, 2, 5)
 
 
-def test_commands_are_broadcast_and_nan_is_none():
+def test_commands_are_broadcast_and_nan_means_no_command():
     with engine(robots=2, worlds=2) as e:
         x = e["pose.pos"][..., 0]
         e.step([0.2, 0.0], 100)
@@ -444,7 +444,7 @@ def test_a_seed_may_be_an_array_of_one_number():
             assert e.state_hash(1) == other.state_hash(1)
 
 
-def test_what_is_refused_changes_nothing():
+def test_a_refused_call_changes_nothing():
     with engine(worlds=2) as e:
         before = [e.state_hash(i) for i in range(2)]
         for refused in ({"seed": -1}, {"seed": [3]}, {"seed": 7, "text": "<sdf"}):
@@ -567,7 +567,7 @@ def falling(name, x, more=""):
         <sensor name='imu' type='imu'><update_rate>100</update_rate></sensor></link>{more}</model>"""
 
 
-def test_what_falls_feels_nothing_from_its_first_sample_on():
+def test_a_falling_imu_measures_0_from_its_first_sample_on():
     """A stone, and robots of both drives: an accelerometer in free fall shows 0, not 9.81."""
     wheels = WHEEL.format(side="left", y=0.2) + WHEEL.format(side="right", y=-0.2)
     drive = "<ruedo:drive type='{}'><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint></ruedo:drive>"
@@ -629,7 +629,7 @@ def test_pictures_and_faults(fault):
         assert late["eye.utime"] == early["eye.utime"]
 
 
-def test_pictures_are_drawn_for_those_who_read_them(monkeypatch):
+def test_pictures_are_drawn_only_when_read(monkeypatch):
     """Without a renderer all goes well until a picture is read."""
     monkeypatch.setenv("RUEDO_RENDERER", "none")
     with with_camera(worlds=2) as e:

@@ -216,7 +216,7 @@ def test_a_copied_environment_is_one_of_its_own(make, copied):
     other.close()
 
 
-def test_what_was_saved_stays_in_the_process():
+def test_saved_episodes_cannot_be_pickled():
     env = ruedo.gym.NavigateEnv(beams=5)
     env.reset(seed=1)
     saved = env.save()
@@ -370,7 +370,7 @@ def test_a_corridor_leads_to_its_end():
 
 
 # In front of a robot that stands still people pass; without them nothing changes, without noise.
-def test_a_hall_has_as_many_people_as_are_asked_for():
+def test_a_hall_has_the_requested_number_of_people():
     for people in (0, 1, 7, 50):
         sdf = ET.fromstring(make_crowd_hall(3, people=people).sdf)
         counts = [int(one.text) for one in sdf.iter("{urn:ruedo}count")]
@@ -665,7 +665,7 @@ def test_options_of_many_are_for_many(option):
 
 
 @pytest.mark.parametrize("mode", ["Disabled", "SameStep"])
-def test_what_was_never_reset_gives_no_rewards(mode):
+def test_an_environment_that_was_never_reset_gives_no_rewards(mode):
     envs = ruedo.gym.NavigateVectorEnv(3, beams=2, autoreset_mode=mode)
     first = {"reset_mask": np.array([True, False, False])}
     envs.reset(seed=1, options=first)
@@ -679,7 +679,7 @@ def test_what_was_never_reset_gives_no_rewards(mode):
     envs.close()
 
 
-def test_a_mask_names_what_is_saved():
+def test_a_mask_selects_the_saved_episodes():
     """Regression: it was taken for the indices 1, 0 and 1."""
     envs = ruedo.gym.NavigateVectorEnv(3, beams=2)
     envs.reset(seed=1)

@@ -151,7 +151,7 @@ def test_other_libraries_take_arrays_without_a_copy():
     envs.close()
 
 
-def test_what_is_received_is_what_step_gives():
+def test_the_learner_receives_the_values_of_step():
     envs, other = (ruedo.gym.NavigateVectorEnv(3, beams=6, max_episode_steps=9) for _ in range(2))
     envs.reset(seed=1), other.reset(seed=1)
     for action in np.random.default_rng(1).uniform(-1, 1, (30, 3, 2)):

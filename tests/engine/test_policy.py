@@ -52,7 +52,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_what_is_no_policy_is_refused(tmp_path, what):
+def test_a_file_that_is_not_a_policy_is_refused(tmp_path, what):
     file = tmp_path / "policy.npz"
     WRONG[what](file)
     with pytest.raises(ValueError, match="policy.npz: is not a policy that save"):

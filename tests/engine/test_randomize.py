@@ -60,7 +60,7 @@ def test_a_reset_equals_a_fresh_start_over_1000_episodes():
     assert touched > 100
 
 
-def test_what_is_drawn_follows_its_distribution():
+def test_drawn_values_follow_their_distribution():
     worlds = 400
     draws = {
         "p3at.yaw": "uniform(-1, 1)",

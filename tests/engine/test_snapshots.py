@@ -88,7 +88,7 @@ def hashes(engine, world, decisions=5):
     return seen
 
 
-def test_arrays_and_what_was_commanded_are_put_back_too():
+def test_arrays_and_commands_are_restored_too():
     with arena(worlds=2, seed=3) as engine:
         ranges, touching = engine["lrf.ranges"], engine.touching()
         while not touching[0].any():  # into a wall

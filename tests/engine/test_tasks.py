@@ -46,7 +46,7 @@ def seen_ahead(world, **options):
 
 
 @pytest.mark.parametrize("channel", range(3))
-def test_what_a_program_builds_has_its_colour(tmp_path, channel):
+def test_shapes_of_a_built_world_have_their_colour(tmp_path, channel):
     """A box ahead of the camera, painted, and covered with a picture of that colour."""
     colour = [0.0, 0.0, 0.0]
     colour[channel] = 1.0
@@ -81,7 +81,7 @@ def test_paints_that_are_wrong_are_refused(paint, error, text):
         assert text in str(caught.value)
 
 
-def test_the_engine_runs_what_a_program_builds():
+def test_the_engine_runs_a_built_world():
     """As launch() does: the wall's face is 2.95 m from the robot, whose scanner is 0.18 m ahead; a
     reset takes another world, with its wall 1 m nearer.
     """
@@ -104,7 +104,7 @@ def test_the_engine_runs_what_a_program_builds():
         ruedo.Engine(built(1.0), text="<sdf/>")
 
 
-def test_a_server_shows_the_texture_of_what_a_program_builds(tmp_path):
+def test_a_server_shows_the_texture_of_a_built_world(tmp_path):
     """Regression: an absolute path was refused."""
     picture = png(tmp_path / "a.png", (255, 0, 0))
     world = ruedo.World().box(2, 0, size=(0.2, 3, 3), texture=picture).robot("p3at")
@@ -189,7 +189,7 @@ def test_a_task_of_ones_own_passes_gymnasiums_check():
     del gymnasium.registry["mine/Approach-v0"]
 
 
-def test_a_task_of_ones_own_says_what_happens():
+def test_a_custom_task_defines_its_outcome():
     """Rewards are the way that was made; the end comes 1 m before the wall."""
     envs = ruedo.gym.TaskVectorEnv(Approach, 3, autoreset_mode="Disabled", noise=False)
     observations, info = envs.reset(seed=4)
@@ -209,7 +209,7 @@ def test_a_task_of_ones_own_says_what_happens():
     envs.close()
 
 
-def test_its_episodes_are_saved_with_what_it_keeps():
+def test_episodes_of_a_custom_task_are_saved_with_its_state():
     envs = ruedo.gym.TaskVectorEnv(Approach, 2)
     envs.reset(seed=1)
     envs.step(np.ones((2, 1)))
@@ -221,7 +221,7 @@ def test_its_episodes_are_saved_with_what_it_keeps():
     envs.close()
 
 
-def test_what_a_task_keeps_may_change_between_episodes():
+def test_the_state_of_a_task_may_change_between_episodes():
     """A curriculum."""
     envs = ruedo.gym.TaskVectorEnv(Approach, 64, farthest=1.6, autoreset_mode="Disabled")
     near, _ = envs.reset(seed=1)
@@ -313,7 +313,7 @@ def test_a_mistake_in_a_task_is_named(what):
         envs.step(np.zeros((2, 1)))
 
 
-def test_what_is_no_task_is_refused():
+def test_a_class_that_is_not_a_task_is_refused():
     for wrong in (3, int, Approach(), None):
         with pytest.raises(TypeError, match=r"task is a subclass of ruedo\.gym\.Task"):
             ruedo.gym.TaskVectorEnv(wrong)
@@ -502,7 +502,7 @@ def test_final_info_has_gymnasiums_masks():
     envs.close(), sync.close()
 
 
-def test_what_was_drawn_is_in_the_info():
+def test_drawn_values_are_in_the_info():
     draws = {
         "robot.mass": "uniform(0.8, 1.2)",
         "robot/lrf.lidar.noise.stddev": "choice(0.01, 0.03)",

@@ -121,7 +121,7 @@ def test_the_page_names_pictures_that_are_there(run):
             xml.etree.ElementTree.parse(path)
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     done = subprocess.run(
         [RUEDO, "experiments", "--out", tmp_path / "file"],

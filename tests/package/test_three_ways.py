@@ -99,7 +99,7 @@ def test_fetch_content(tmp_path, archive):
     assert "/nowhere" in error
 
 
-def test_a_machine_without_lcm_is_told_what_to_do(tmp_path, archive):
+def test_a_machine_without_lcm_is_reported_what_to_do(tmp_path, archive):
     run("tar", "xzf", archive, "-C", tmp_path)
     said = run(
         CMAKE,

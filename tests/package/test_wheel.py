@@ -163,7 +163,7 @@ def test_a_program_of_the_clients_words(venv, tmp_path):
     assert said.endswith("rate 20\ndrove True\njoint position\nray 0.95\n")
 
 
-def test_an_unknown_world_is_told_with_those_that_there_are(venv):
+def test_an_unknown_world_is_reported_with_those_that_there_are(venv):
     said = run(
         venv / "bin/python",
         "-c",

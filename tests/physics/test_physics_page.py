@@ -64,7 +64,7 @@ def test_the_numbers_are_those_of_the_closed_forms(out):
     assert numbers["arm_velocity"]["values"]["Ruedo"] < 1e-4  # rad/s
 
 
-def test_an_unknown_test_and_a_folder_that_cannot_be_written_are_told(tmp_path):
+def test_an_unknown_test_and_a_folder_that_cannot_be_written_are_reported(tmp_path):
     done = page("--only", "nonsense")
     assert done.returncode == 2 and "nonsense" in done.stderr
     (tmp_path / "file").write_text("")

@@ -102,7 +102,7 @@ def test_nothing_is_asked_where_all_is_there(machine):
 
 
 @as_root
-def test_one_call_installs_what_is_missing(machine):
+def test_one_call_installs_missing_packages(machine):
     code, _, calls = machine(installed=["a"], known=["a", "b", "c"]).ensure("a", "b", "c")
     assert code == 0
     assert calls == ["update -q", "install --no-install-recommends -y -q b c"]
@@ -158,7 +158,7 @@ def test_the_tiers_name_tests_that_there_are():
             assert any(re.fullmatch(pattern, name) for name in names), line
 
 
-def test_failed_tests_are_told_again_at_the_end(tmp_path):
+def test_failed_tests_are_listed_at_the_end(tmp_path):
     (tmp_path / "CTestTestfile.cmake").write_text("""
 add_test(good "true")
 add_test(bad "sh" "-c" "seq 100; printf 'red <&]]>'; exit 3")

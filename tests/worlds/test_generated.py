@@ -44,7 +44,7 @@ def png_pixels(path):
     return pixels
 
 
-def test_bases_are_what_the_script_makes(tmp_path):
+def test_bases_equal_the_scripts_output(tmp_path):
     subprocess.run([sys.executable, WORLDS / "robots/make_bases.py", tmp_path], check=True)
     made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
     assert len(made) == 16
@@ -54,7 +54,7 @@ def test_bases_are_what_the_script_makes(tmp_path):
         )
 
 
-def test_worlds_are_what_the_script_makes(tmp_path):
+def test_worlds_equal_the_scripts_output(tmp_path):
     subprocess.run([sys.executable, WORLDS / "make_worlds.py", tmp_path], check=True)
     made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
     assert len(made) == 7
@@ -74,7 +74,7 @@ def test_worlds_are_what_the_script_makes(tmp_path):
         ("office/make_office.py", "office"),
     ],
 )
-def test_files_are_what_the_script_makes(tmp_path, script, outputs):
+def test_files_equal_the_scripts_output(tmp_path, script, outputs):
     copy = run_copy(tmp_path, script)
     made = [p for p in (copy / outputs).rglob("*") if p.suffix in (".obj", ".mtl", ".png")]
     assert made
@@ -86,7 +86,7 @@ def test_files_are_what_the_script_makes(tmp_path, script, outputs):
             assert path.read_text() == kept.read_text(), kept
 
 
-def test_office_world_is_what_the_script_makes(tmp_path):
+def test_office_world_equals_the_scripts_output(tmp_path):
     copy = run_copy(tmp_path, "office/make_office.py")
     assert (copy / "office.sdf").read_text() == (WORLDS / "office.sdf").read_text()
 

@@ -83,7 +83,7 @@ def test_the_same_bytes_with_any_number_of_threads(runs):
     assert one == four and len(one) > 10_000
 
 
-def test_a_scale_weighs_what_lies_on_it_at_any_tilt(runs):
+def test_a_scale_weighs_its_load_at_any_tilt(runs):
     last = runs[1]["table/cell"][-1]
     # In the axes of the foot, which is tilted as well; friction along the plate is weighed, too.
     weight = 7 * G

@@ -52,7 +52,7 @@ def test_nothing_in_it_is_wrong(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["rooms", "maze", "warehouse", "field", "crossing"])
-def test_a_robot_drives_as_told(name):
+def test_a_robot_drives_as_commanded(name):
     """0.2 m/s for 1 s, where it starts: 0.2 m, but for what starting and stopping take (below 0.1
     m).
     """

@@ -506,7 +506,7 @@ def test_what_lies_beside_the_topics_is_read_and_written_by_others(logged, tmp_p
 
 
 @pytest.mark.parametrize("what", ["run", "run/run_0.mcap"])
-def test_what_wants_a_log_says_so_of_a_bag(logged, what):
+def test_commands_that_need_a_log_refuse_a_bag(logged, what):
     result = subprocess.run(
         [RUEDO, "verify", logged / what], capture_output=True, text=True, timeout=120
     )

@@ -135,7 +135,7 @@ def test_noise_on_all_that_is_read_is_harmless():
 
 
 @pytest.mark.parametrize("hears", [False, True], ids=["deaf", "hears"])
-def test_who_asks_much_keeps_nobody_waiting(hears):
+def test_a_client_with_many_calls_delays_no_other(hears):
     with Run("--no-noise") as run:
         hostile, honest = Client(run.domain), Client(run.domain)
         question, answer = SERVICES["get_entity_state"]
@@ -209,7 +209,7 @@ class Flood:
     [("get_entity_state", "deaf", "p3at"), ("get_simulation_state", "hears")],
     ids=["deaf", "hears"],
 )
-def test_a_flood_of_calls_keeps_nobody_waiting(arguments):
+def test_a_flood_of_calls_delays_no_other_client(arguments):
     with Run("--no-noise") as run:
         known = Client(run.domain)
         assert known.call("get_entity_state", "p3at").result.result == 1
@@ -384,7 +384,7 @@ def test_no_number_moves_nothing(speed):
     assert run.process.returncode == 0
 
 
-def test_a_reader_that_never_takes_costs_nobody_anything():
+def test_a_reader_that_never_reads_slows_no_other():
     with Run("--rate", "max", "--duration", "20", "--paused") as run:
         sleeper, peer = Peer(run.domain), Peer(run.domain)
         sleeper.reader("/scan", LaserScan, depth=1)

@@ -48,7 +48,7 @@ class Viewer:
         return self.shown
 
 
-def test_what_is_drawn_is_seen_and_taken_away(run):
+def test_markers_appear_and_are_removed(run):
     viewer = Viewer(run)
     with ruedo.connect(LCM, timeout=60) as sim:
         sim.sleep(0.1)  # markers have the time of the state on which they are drawn

@@ -101,7 +101,7 @@ def test_contacts_carry_the_weight(bag):
     assert bag["/bumper"][-1].data is True
 
 
-def test_what_a_robot_runs_into_is_told():
+def test_collisions_of_a_robot_are_published():
     """The arena's parcel, a box of 0.45 m, stands 2 m ahead of the robot."""
     with Run("--no-noise", "--rate", "4") as run:
         peer = Peer(run.domain)

@@ -55,7 +55,7 @@ def test_a_failure_is_a_status(one, expected):
     assert taken(one, evidence=["12 steps"]) == expected
 
 
-def test_what_the_client_says_of_memory_is_its_own_fault_alone():
+def test_a_memory_error_in_the_output_hides_no_failed_expectation():
     assert taken(failure("clearance"), output="MemoryError") == ("failed", "clearance", "why")
 
 
@@ -70,7 +70,7 @@ def test_a_client_without_memory_is_no_crash(word):
     assert taken(failure("contact"), output=word)[0] == "failed"
 
 
-def test_the_first_failure_is_what_stays():
+def test_the_first_failure_stays():
     outcome = Outcome()
     outcome.fail("timeout", "controller", "slow")
     outcome.take(verdict(failure("contact"), evidence=["12 steps"]), 100)

@@ -63,14 +63,14 @@ def test_they_are_listed_and_described(peer, parameters):
     assert read_only == ["seed", "step_size", "use_sim_time", "world"]
 
 
-def test_what_is_set_is_told(peer, parameters):
+def test_a_set_parameter_is_published(peer, parameters):
     assert parameters.reasons(rate=2.0, paused=True, fault="p3at/lrf:dropout,for=5") == [""] * 3
     assert parameters.values("rate", "paused", "fault") == [2.0, True, "p3at/lrf:dropout,for=5"]
     peer.spin_until(lambda: len(parameters.changed()) >= 3, "events")
     assert parameters.changed() == ["rate", "paused", "fault"]
 
 
-def test_what_cannot_be_set_is_refused(peer, parameters):
+def test_a_read_only_parameter_is_refused(peer, parameters):
     refused = parameters.reasons(seed=3, rate="fast", nobody=1, paused=2)
     for reason, words in zip(
         refused,
