@@ -939,7 +939,7 @@ class [[nodiscard]] Simulation : public Requests {
   /// @param x m, world
   /// @param y m, world
   /// @param options heading, name, height, or the model's text
-  /// @return the model's name: the server numbers one that is taken, unless it was asked for
+  /// @return the model's name: the server numbers a name that exists, unless the call gave it
   std::string spawn(const std::string& model, double x, double y,
                     const SpawnOptions& options = {}) const;
   /// @copydoc Requests::remove
@@ -1074,8 +1074,8 @@ Simulation launch(const std::string& world, const LaunchOptions& options = {});
 class LogFile;  // clients/cpp/log.cpp
 
 /// What a run recorded (`ruedo run --record`), or any other log of LCM's: its messages by channel.
-/// They are read from the file when they are asked for, so that a log of any size is opened at
-/// once. Copies share the file. Thread safe.
+/// They are read from the file on demand, so that a log of any size is opened at once. Copies share
+/// the file. Thread safe.
 class Log {
  public:
   /// @cond

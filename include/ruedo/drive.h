@@ -26,7 +26,7 @@ struct BaseVelocity {
   double turn = 0.0;   ///< rad/s, positive to the left
 };
 
-/// What a drive is told when it is made.
+/// The description with which a drive is made.
 struct DriveSetup {
   const Element&
       element;        ///< its `<ruedo:drive type="...">`; children of one's own are read from it

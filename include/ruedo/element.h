@@ -72,10 +72,10 @@ class Element {
   /// @return its value; null when it is absent
   const std::string* attribute(std::string_view key) const;
   /// @param path of a child
-  /// @return the first one there; null when there is none
+  /// @return the first one there; null without one
   const Element* child(std::string_view path) const;
   /// @param path of a child
-  /// @return the first one there; null when there is none
+  /// @return the first one there; null without one
   Element* child(std::string_view path);
   /// @param child_name without a path
   /// @return the children of that name, in the order of the file
@@ -88,13 +88,13 @@ class Element {
   /// @param fallback where it is absent
   /// @param allowed its values
   /// @return the child's text as a number
-  /// @throws InputError when it is none, or not allowed
+  /// @throws InputError for other text, or for a value that is not allowed
   double number(std::string_view path, double fallback, Allowed allowed) const;
   /// @param path of a child
   /// @param fallback where it is absent
   /// @param allowed its values
   /// @return the child's text as a whole number
-  /// @throws InputError when it is none, or not allowed
+  /// @throws InputError for other text, or for a value that is not allowed
   int64_t integer(std::string_view path, int64_t fallback, Allowed allowed) const;
   /// @param path of a child
   /// @param fallback where it is absent
@@ -131,11 +131,11 @@ class Element {
 
   /// @param allowed its values
   /// @return this element's own text as a number
-  /// @throws InputError when it is none, or not allowed
+  /// @throws InputError for other text, or for a value that is not allowed
   double as_number(Allowed allowed) const;
   /// @param allowed its values
   /// @return this element's own text as a whole number
-  /// @throws InputError when it is none, or not allowed
+  /// @throws InputError for other text, or for a value that is not allowed
   int64_t as_integer(Allowed allowed) const;
   /// @return whether this element's own text is true or 1, not false or 0
   /// @throws InputError when it is none of these

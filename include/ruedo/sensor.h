@@ -86,11 +86,11 @@ class Outbox {
   int64_t step_ = 0;
 };
 
-/// What a sensor is told when it is made.
+/// The description with which a sensor is made.
 struct SensorSetup {
   const world::WorldModel& world;   ///< as the files say it
   const world::BodyLayout& layout;  ///< what lies at which index of a Snapshot
-  /// Its `<sensor>`, or `<ruedo:odometry>`, ...; an empty element when there is none.
+  /// Its `<sensor>`, or `<ruedo:odometry>`, ...; an empty element without one.
   const Element& element;
   std::string robot;       ///< name
   std::string device;      ///< name; the main channel is robot + "/" + device

@@ -19,7 +19,7 @@ class ElementWatch {
 
   bool read(int line, const std::string& name) const { return seen_.contains(key(line, name)); }
 
-  // For Element: somebody asked for it, or for its attribute.
+  // For Element: a reader read it, or its attribute.
   static void note(const Element& element) {
     if (watch_) watch_->seen_.insert(key(element.source.line, element.name));
   }

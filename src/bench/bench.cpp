@@ -22,7 +22,7 @@ namespace {
 
 using Table = BenchTask::Table;
 
-// A port that no simulation uses unless it is told to; nothing leaves the machine.
+// A port that no simulation uses by default; nothing leaves the machine.
 constexpr const char* kBenchUrl = "udpm://239.255.76.67:7691?ttl=0";
 
 struct BenchArguments {

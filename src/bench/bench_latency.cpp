@@ -32,7 +32,7 @@ constexpr const char* kWorld = R"(<sdf version="1.9"><world name="latency">
   <include><uri>model://ground_plane</uri></include>
   <include><uri>model://p3at</uri><name>r</name></include></world></sdf>)";
 // A command is lost after a second in which steps were heard, so that neither end loses any by
-// being held up; or where none are, as over an address that does not reach the client.
+// being delayed; or where none are, as over an address that does not reach the client.
 constexpr auto kLook = std::chrono::milliseconds(10);
 constexpr int kLostLooks = 100, kDeafLooks = 1000;
 

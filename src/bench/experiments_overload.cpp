@@ -1,5 +1,5 @@
 // E4: the paper blames errors on an overloaded host. Here the whole server runs once on an idle
-// host and once beside threads that burn every core, with modules held up at random: the bytes must
+// host and once beside threads that burn every core, with modules delayed at random: the bytes must
 // be the same.
 #include <atomic>
 #include <limits>
@@ -105,7 +105,7 @@ void overload_experiment(Experiments& all) {
       }
     });
   }
-  // Modules are held up for up to 2 ms, differently in every run.
+  // Modules are delayed by up to 2 ms, differently in every run.
   const Run loaded = run_world([](const std::string&) {
     thread_local std::minstd_rand random(std::random_device{}());
     if (random() % 4 == 0) std::this_thread::sleep_for(std::chrono::microseconds(random() % 2000));

@@ -33,7 +33,7 @@ sockaddr_in address_of(const LcmUrl& url) {
   return address;
 }
 
-// A host's IPv4 address; "" when there is none.
+// A host's IPv4 address; "" if it has none.
 std::string resolved(const std::string& host) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_family = AF_INET;

@@ -25,7 +25,7 @@ constexpr uint32_t kShort = 0x4c433032, kFragment = 0x4c433033;
 constexpr size_t kShortHead = 8, kFragmentHead = 20, kLargestDatagram = 65536;
 constexpr size_t kFragmentMemory = 128;  // beside its data
 
-// The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: there is none.
+// The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: no channel.
 std::string_view channel_at(const uint8_t* bytes, size_t size) {
   const auto* end = static_cast<const uint8_t*>(
       std::memchr(bytes, 0, std::min(size, MulticastReceiver::kLongestChannel + 1)));

@@ -41,7 +41,7 @@ class MulticastReceiver {
     bool operator==(const Sender&) const = default;
   };
 
-  // Takes one datagram, and calls the handler when it completes a message. False: there is none.
+  // Takes one datagram, and calls the handler when it completes a message. False: none waits.
   // Datagrams that are not LCM's are ignored.
   bool receive(const Handler& handler);
   // The same for a datagram that came in another way.

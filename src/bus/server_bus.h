@@ -17,7 +17,7 @@ struct ServerBus {
   LcmUrl url;
   // Clients do not find the address by themselves: they need LCM_DEFAULT_URL.
   bool announce = false;
-  // Why the address differs from the one asked for; "": it does not.
+  // Why the address differs from the requested one; "": it does not.
   std::string note;
   FileHandle token;  // keeps `auto` and the client libraries' launch() from the same port
   std::unique_ptr<UrlClaim> claim;
@@ -26,7 +26,7 @@ struct ServerBus {
 
 // `text` is an LCM URL; "auto": a free port of this machine; "auto-tcp": the same, and tcpq in any
 // case; "": $LCM_DEFAULT_URL, else LCM's default group, else, where that has no route,
-// tcpq://127.0.0.1:7700. `world` is what others are told of this server; `say` gets a line about
+// tcpq://127.0.0.1:7700. `world` describes this server to others; `say` gets a line about
 // each rival (rival_watch.h). Throws InputError for a
 // bad address and EnvironmentError, with the cure, when it cannot be served or another server has
 // it.

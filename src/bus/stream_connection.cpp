@@ -36,7 +36,7 @@ bool StreamConnection::send(const std::vector<uint8_t>& bytes) {
   return true;
 }
 
-// Those who still publish are told, too.
+// Publishers are notified, too.
 bool StreamConnection::end() {
   over_ = true;
   ::shutdown(socket_.get(), SHUT_RDWR);

@@ -78,7 +78,7 @@ class Filter {
   bool empty() const { return names_.empty() && beginnings_.empty(); }
 
  private:
-  std::unordered_map<std::string, int> names_, beginnings_;  // with how often each was asked for
+  std::unordered_map<std::string, int> names_, beginnings_;  // with the number of requests
 };
 
 // A pattern as a name, or as the beginning that all names which match it have.

@@ -91,7 +91,7 @@ std::string words_of(const std::string& fault, const std::string& target, double
 // Names may come from messages that are refused: of any length.
 std::string fit(const std::string& text) { return shortened(text, Events::kLongestText); }
 
-// The name in a request's body; "" if there is none.
+// The name in a request's body; "" without one.
 std::string name_in(int32_t kind, std::span<const uint8_t> body) {
   if (kind == request_t::SPAWN) {
     const auto spawn = decoded<spawn_request_t>(body);

@@ -79,7 +79,7 @@ size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
   return sum;
 }
 
-// The smallest interval for which they fit, to a hundredth; -1 if there is none.
+// The smallest interval for which they fit, to a hundredth; -1 if none fits.
 SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) {
   const auto fits = [&](SimTime interval_us) {
     return size_of(index, pictures, interval_us) <= room;

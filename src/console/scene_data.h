@@ -30,7 +30,7 @@ struct SceneData {
   // for each link: int32 kind, int32 body (-1: static), float32 x, y, z, qw, qx, qy, qz of the link
   // in its body, or in the world; little endian
   http::Bytes links;
-  std::vector<Picture> pictures;  // in the order of the JSON's textures; empty if there is none
+  std::vector<Picture> pictures;  // in the order of the JSON's textures; empty without textures
 
   explicit SceneData(const world::WorldModel& world, int version);
 };

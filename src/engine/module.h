@@ -120,7 +120,7 @@ class Module {
   // `output`. Batches come in order; left_off: once true, samples are no longer wanted.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
   // Lets the device of a channel take the last sample that it skipped because nobody read it, if no
-  // later one was due; does nothing if there is none.
+  // later one was due; does nothing otherwise.
   void catch_up(int channel, Outbox& out);
   // Whether a sample is due before that step.
   bool is_due(int64_t before_step) const { return to_sample_.next() < before_step; }

@@ -42,7 +42,7 @@ struct Plan {
   world::BodyLayout layout;
   std::shared_ptr<StaticScenes> statics = std::make_shared<StaticScenes>();
 
-  // A world's physics as it begins; made when it is first asked for, and never stepped.
+  // A world's physics as it begins; made on first use, and never stepped.
   const physics::PhysicsWorld& beginning();
 
  private:

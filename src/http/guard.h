@@ -32,7 +32,7 @@ struct Visit {
 // "" if the request is allowed; otherwise the reason. token: "" if none is required.
 std::string refuse(const Visit& visit, const Address& address, const std::string& token);
 
-// The value of a cookie; "" when there is none.
+// The value of a cookie; "" without one.
 std::string cookie_value(std::string_view cookies, std::string_view name);
 
 // Addresses at which browsers reach the console: of all interfaces for 0.0.0.0.

@@ -31,7 +31,7 @@ class Connection {
   virtual ~Connection() = default;
   // Handles a whole message; false closes the connection.
   virtual bool on_message(std::span<const uint8_t> message) = 0;
-  // Puts the next message into `message`; false if there is none now.
+  // Puts the next message into `message`; false if none is waiting.
   virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
 };
 

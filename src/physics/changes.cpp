@@ -10,7 +10,7 @@ void Changes::forget(size_t bodies) {
   changes_ = 0;
   end_[0] = 0;
   latest_.assign(bodies, 0);
-  ring_.resize(3 * bodies);  // those of a state, and as many as are ever asked for
+  ring_.resize(3 * bodies);  // those of a state, and as many as are ever requested
 }
 
 void Changes::add_state(const std::vector<BodyIndex>& changed) {

@@ -28,7 +28,7 @@ Snapshot initial_snapshot(const world::BodyLayout& layout);
 std::vector<std::string> device_names(const world::WorldModel& world,
                                       const world::BodyLayout& layout);
 
-// Makes ROBOT/DEVICE; null when there is none.
+// Makes ROBOT/DEVICE; null for an unknown one.
 std::unique_ptr<LoneDevice> make_lone_device(const world::WorldModel& world,
                                              const world::BodyLayout& layout,
                                              const std::string& name, bool noise);

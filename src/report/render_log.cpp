@@ -168,7 +168,7 @@ class Scene {
   const std::string& name_of(RobotIndex robot) const {
     return world_->models[layout_.robots[robot].instance].name;
   }
-  // Invalid: there is none of that name.
+  // Invalid: unknown name.
   RobotIndex find_robot(const std::string& name) const {
     for (const RobotIndex robot : layout_.robots.indices()) {
       if (name_of(robot) == name) return robot;

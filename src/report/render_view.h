@@ -13,7 +13,7 @@ struct Size {
   int width = 0, height = 0;  // pixels; 0: not given
 };
 
-// A finite number, all of the text; nullopt: it is none.
+// A finite number, all of the text; nullopt for other text.
 std::optional<double> parse_number(const std::string& text);
 
 // "WxH". Throws InputError.

@@ -1,4 +1,4 @@
-// Detachable joints: a model holds other models, by name, until it is told to release them.
+// Detachable joints: a model holds other models, by name, until a command releases them.
 //
 // They are closed at the start, with both models where they are then; a model that arrives later is
 // held where it arrives. Not thread-safe: owned by the kinematics module.

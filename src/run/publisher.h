@@ -63,7 +63,7 @@ class Publisher {
   int64_t step() const { return step_; }
   SimTime time_us() const { return time_us_; }
   const Snapshot* latest() const { return latest_; }
-  // The same state as a request changed it. Nothing when there is none yet.
+  // The same state as a request changed it. Nothing before the first state.
   void change_latest(const Snapshot& state) {
     if (latest_) latest_ = &state;
   }

@@ -278,7 +278,7 @@ Run::Clock::time_point Run::attend() {
   return std::min({next_status_, last_sign() + kPausedInfoPeriod, next_tick, attended.next});
 }
 
-// The run can go no further without an answer; in real time the answer is asked for earlier.
+// The run can go no further without an answer; in real time the answer is requested earlier.
 bool Run::launcher_wants_tick(int64_t step) const {
   if (!backpressure_.acts() || repeating_) return false;
   const auto [at_any_rate, at_highest_rate] = backpressure_.limits();

@@ -111,7 +111,7 @@ class Run {
   uint64_t lost() const { return bus_.failed() + bus_.replaced(); }
 
   const engine::Channels& channels() const { return channels_; }
-  // What clients are told of the world; valid until models come or go.
+  // The description of the world for clients; valid until models come or go.
   const std::vector<world_info_t>& info() const { return publisher_.announcement().info; }
   // What a log of this run begins with; empty where nothing records, watches or repeats it.
   const log_header_t& log_header() const { return header_; }
@@ -296,7 +296,7 @@ class Run {
   SavedStates saved_states_;
   std::shared_ptr<engine::Plan> plan_of_saved_;  // of their worlds
 
-  // Who is told in this process.
+  // Callbacks of the watcher in this process.
   std::function<void(const Status&)> on_status_;
   std::function<void(const std::string&)> on_stall_;
   std::function<void(const Snapshot&)> on_state_;

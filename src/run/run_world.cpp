@@ -131,7 +131,7 @@ std::string Run::take_turns() {
     return "";
   } catch (const InputError& error) {
     if (!options_.repeat.empty()) throw;
-    control_.cancel(error.what());  // the client that asked is told
+    control_.cancel(error.what());  // the client gets this reply
     spdlog::error("{}. The run is paused", error.what());
     break_repeat_off();
     return error.what();

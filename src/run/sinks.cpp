@@ -21,7 +21,7 @@ void BusSink::listen(Bus::Handler handler) {
   bus_.listen(inputs_, std::move(handler), outputs_);
 }
 
-// Answers are asked for once, and of what goes in parts the last part replaces nothing.
+// Answers are requested once; a last part of a message replaces nothing.
 bool is_conflated(const engine::Channel& channel, const engine::SimulationChannels& own,
                   engine::ChannelIndex index) {
   return !channel.input && index != own.reply && index != own.info && channel.name != kWorldChannel;

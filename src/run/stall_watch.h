@@ -1,7 +1,7 @@
 // Says within two seconds why a run does not go on, once for each time that it stands.
 //
 // While the publisher has nothing to do it asks for the reason itself: a client, a sensor, a step.
-// When the publisher itself is held up, by a request or a disk, a thread of the watch notices that
+// When the publisher itself is blocked, by a request or a disk, a thread of the watch notices that
 // its beats have stopped, and reports it; likewise when the whole process was stopped. That thread
 // does all the telling, and holds nothing up meanwhile: standard error may be a pipe that nobody
 // reads.
@@ -23,7 +23,7 @@ class StallWatch {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kPatience{1500};
-  // A client that takes seconds for each answer is told of at most once in this time.
+  // A client that takes seconds for each answer is reported at most once in this time.
   static constexpr std::chrono::seconds kQuiet{60};
 
   enum class At { rest, steps, messages, request };  // what the publisher is at

@@ -36,7 +36,7 @@ class WaitFor {
   // Models have come or gone at that step: robots that are waited for, maybe.
   void models_changed(const engine::Channels& channels, int64_t step);
 
-  // False: the channel is none of these.
+  // False: another channel.
   bool on_message(const std::string& channel, const uint8_t* data, size_t size);
 
   // What has to come before the state after `step` can be computed, in words; "": nothing.

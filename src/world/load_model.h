@@ -41,7 +41,7 @@ std::string shared_path(const ModelInstance& one, const ModelInstance& other);
 // Reports models of a world that share a path: who asks for it cannot tell which is meant.
 void name_shared_paths(const WorldModel& world, Findings& findings);
 
-// The file that load_model() would read. Throws InputError if there is none.
+// The file that load_model() would read. Throws InputError if it does not exist.
 std::string model_file(const std::string& name, const std::string& world_file);
 
 }  // namespace ruedo::world

@@ -13,7 +13,7 @@
 
 namespace ruedo::dds {
 
-// Bytes of what is told of one participant or endpoint.
+// Bytes of the announcement of one participant or endpoint.
 inline constexpr size_t kMostTold = size_t{16} << 10;
 
 using Entity = std::array<uint8_t, 4>;    // a GUID without its prefix

@@ -54,7 +54,7 @@ std::vector<Samples> samples_in(std::span<uint8_t> message) {
 }
 
 size_t write_dropped(const Samples& samples, std::span<uint8_t> out) {
-  constexpr uint8_t kFinal = 2;  // no answer is asked for
+  constexpr uint8_t kFinal = 2;  // no answer is requested
   std::array<uint8_t, kMessageHeader + kSubmessageHeader + kHeartbeatBody> message{
       'R', 'T', 'P', 'S', 2, 1, 1, 16};
   std::copy_n(samples.writer.begin(), kPrefix, message.begin() + 8);

@@ -27,7 +27,7 @@ struct Samples {
 };
 
 inline constexpr size_t kMostHeld = size_t{128} << 20;  // bytes
-// Writers whose samples may be in one datagram. Those of the others are asked for again.
+// Writers whose samples may be in one datagram. Samples of other writers are requested again.
 inline constexpr size_t kMostWritersInDatagram = 16;
 
 // Those in an RTPS message. What is of too many writers, or has no possible sequence number,

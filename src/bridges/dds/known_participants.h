@@ -4,7 +4,7 @@
 // knows, and a false one costs a stranger one datagram. So a socket has its share, as programs have
 // one each; so it is with endpoints of one topic and with addresses, of which Cyclone seeks the
 // fewest that reach all readers. Where there is no room, who was not heard for longest gives way,
-// or who has the most endpoints; Cyclone is told that it has left.
+// or who has the most endpoints; Cyclone gets a message that it has left.
 #pragma once
 
 #include <array>

@@ -48,7 +48,7 @@ std::string target(const EditArguments& arguments) {
   if (arguments.world.empty()) return kNewWorld;
   if (is_new(arguments)) return arguments.world;
   if (!is_there(arguments.world)) {
-    world::world_file(arguments.world);  // throws when there is none
+    world::world_file(arguments.world);  // throws for an unknown name
     throw InputError({}, "'" + arguments.world +
                              "' is the name of a world that comes with Ruedo or lies in "
                              "RUEDO_PATH: say where to save it by --save-as FILE");

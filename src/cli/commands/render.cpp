@@ -108,7 +108,7 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const world::WorldMo
   throw EnvironmentError("the camera gave no picture");
 }
 
-// Colour pictures of the camera that is asked for come raw, in the size that is asked for.
+// Colour pictures of the requested camera come raw, in the requested size.
 std::shared_ptr<const world::WorldModel> load(const RenderArguments& arguments) {
   draw_as_told(arguments.world);
   world::LoadOptions options = load_options(arguments.world);

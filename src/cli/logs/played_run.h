@@ -28,7 +28,7 @@ class PlayedRun {
   void serve(SimTime time_us);
   bool serves() const { return worlds_ != nullptr; }  // else it is played without ruedo/info
   bool asked() const { return asked_; }               // by a client, since the last info
-  void end();                                         // the log is over, as clients are told
+  void end();                                         // tells clients that the log is over
 
  private:
   void make_worlds(const std::string& path);

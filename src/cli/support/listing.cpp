@@ -150,7 +150,7 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
 
 namespace {
 
-// Infinity is no limit: what it is told, it does at once.
+// Infinity is no limit: it executes commands at once.
 std::string accelerations(const robot_info_t& robot) {
   std::string limited, at_once;
   const auto add = [&](const char* does, double limit, const char* unit) {

@@ -63,7 +63,7 @@ Outcome remove(const std::string& name, Simulation& simulation, Channels& channe
 Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& simulation,
                  Channels& channels);
 Pose pose_of(const set_pose_request_t& request);
-// Whether the model of that name is fixed; false if there is none.
+// Whether the model of that name is fixed; false for an unknown name.
 bool is_fixed(const world::WorldModel& world, const std::string& name);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);
 // Returns all models to where they started or were spawned, at rest.

@@ -30,7 +30,7 @@ class WorldEditor {
   world::WorldModel& world_;
 };
 
-// Index of the model with that name; -1: there is none.
+// Index of the model with that name; -1: unknown.
 InstanceIndex find_model(const world::WorldModel& world, const std::string& name);
 
 // The pose for a SPAWN: as requested, or standing on the ground below.

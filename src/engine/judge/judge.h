@@ -39,7 +39,7 @@ struct Expectations {
   std::optional<double> clearance;
   std::optional<double> odometry_error;  // m, at most, between odometry and truth
   double clearance_reach =
-      0.0;  // m: clearances below this are measured, whether or not one is asked for
+      0.0;  // m: clearances below this are measured, whether or not one is required
   bool allow_requests = false;  // the robot may be moved by a request of the program's
 
   bool any() const { return !goals.empty() || no_contact || clearance || odometry_error; }

@@ -15,7 +15,7 @@ namespace ruedo::judge {
 
 enum class Outcome { passed, failed, not_judged };
 
-// One thing that was asked for.
+// One expectation.
 struct Check {
   std::string what;  // "run", "goal 0", "contact", "clearance", "odometry", "client", "golden", ...
   Outcome outcome = Outcome::passed;
@@ -35,7 +35,7 @@ struct Place {
 };
 
 struct Verdict {
-  std::vector<Check> checks;  // in the order in which they are told
+  std::vector<Check> checks;  // in the order of the report
   std::vector<Metric> metrics;
   std::vector<Place> track;
 

@@ -1,4 +1,4 @@
-// What motors of wheels and joints are told.
+// Targets of the motors of wheels and joints.
 #pragma once
 
 namespace ruedo::physics {

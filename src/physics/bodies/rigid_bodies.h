@@ -19,7 +19,7 @@ struct ObjectInfo {
   InstanceIndex instance;
   bool self_collide = false;  // of its model
   bool plane = false;
-  bool on_plane = false;  // held up by a plane without a contact pair
+  bool on_plane = false;  // supported by a plane without a contact pair
   bool moved = false;     // kinematic: moved from outside, never by contacts
   bool gone = false;      // its model was removed
   struct Shape {

@@ -15,7 +15,7 @@ namespace {
 constexpr size_t kTouchingABody = 8;  // expected maximum
 // What falls asleep has been slow, and within this distance of one place, for 2 s.
 constexpr btScalar kStays_m = 5e-5, kStays_rad = 5e-5;
-// A motor that is told to move faster does not let its bodies sleep; m/s or rad/s.
+// A motor with a faster target keeps its bodies awake; m/s or rad/s.
 constexpr double kTold = 1e-6;
 
 // Bullet's island tag is a body's index in bodies_; negative for bodies that do not take part.

@@ -23,7 +23,7 @@ class Nowhere : public Bus {
 
 using Values = std::vector<std::pair<std::string, std::string>>;
 
-// Every value of a message; false for a type that is not known, or a message that is none.
+// Every value of a message; false for a type that is not known, or for a broken message.
 bool values_of(const std::vector<uint8_t>& message, Values& values) {
   const Schema* schema = find_schema(fingerprint_of(message));
   return schema &&

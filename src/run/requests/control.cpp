@@ -165,7 +165,7 @@ void Control::defer(const request_t& request) {
     held_.push_back(request);
 }
 
-// There is still room for a PAUSE when there is none for a STEP.
+// A PAUSE has room when a STEP has none.
 bool Control::has_too_many(const request_t& request) const {
   const auto waiting =
       static_cast<size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Waiting& each) {

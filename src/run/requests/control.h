@@ -71,7 +71,7 @@ class Control {
   void finish(int64_t session, int64_t sequence, engine::Outcome outcome);
 
   const Sessions& sessions() const { return sessions_; }
-  void drop(int64_t session);  // it leaves, and what it asked for is forgotten
+  void drop(int64_t session);  // it leaves, and its requests are forgotten
   uint64_t refused() const { return refused_; }
 
  private:

@@ -53,7 +53,7 @@ class EditedWorld {
   std::string source_;                              // the text that the world was loaded from
   std::string fault_;                               // why there is none
   std::optional<std::string> known_;                // what the file holds; none: there is none
-  mutable std::unique_ptr<world::WorldText> text_;  // made when it is asked for
+  mutable std::unique_ptr<world::WorldText> text_;  // made on first use
   mutable std::mutex mutex_;                        // of that, and of what follows
   std::map<std::string, std::string> spawned_;      // texts, by name
   std::set<std::string> put_;

@@ -36,7 +36,7 @@ class SavedStates {
 
   // path: the snapshot's file, which is written.
   void keep(const std::string& path, SavedState state);
-  // Null: there is none, or the file is another one by now.
+  // Null: not in memory, or the file has changed.
   const SavedState* find(const std::string& path);
   void forget(const std::string& path);
 

@@ -21,7 +21,7 @@ struct Session {
   int64_t last_sequence = 0;    // executed, or being executed
   std::deque<reply_t> replies;  // the last ones, oldest first
   std::chrono::steady_clock::time_point last_heard;
-  bool spoke = false;  // asked for something since it joined
+  bool spoke = false;  // has sent a request since it joined
 };
 
 // Not thread safe.

@@ -28,7 +28,7 @@ ControllersDrive drive_from_controllers(const Element& model_element,
                                         ReadContext& context);
 
 // The joints that <transmission> and <ros2_control> let a controller turn: those with a velocity
-// interface, or all if there is none.
+// interface, or all without one.
 std::vector<std::string> controlled_joints(const Element& model_element);
 
 }  // namespace ruedo::world

@@ -20,7 +20,7 @@ double number(const Element& map, const char* name, const Allowed& allowed, doub
   return written ? written->as_number(allowed) : fallback;
 }
 
-// Infinite: there is none.
+// Infinite: no limit.
 double clamp(const Element& map, const char* name, double fallback) {
   const Element* written = map.child(name);
   if (!written || !is_infinite(written->text)) return number(map, name, kClamp, fallback);

@@ -17,10 +17,9 @@ namespace ruedo::world {
 
 class ControllerFiles {
  public:
-  static constexpr size_t kLargestFile = 1 << 18;  // bytes
-  static constexpr size_t kMostBytes = 4 << 20;    // of YAML of all files
-  static constexpr size_t kMostEntries =
-      1'000'000;  // of files, counted each time they are asked for
+  static constexpr size_t kLargestFile = 1 << 18;    // bytes
+  static constexpr size_t kMostBytes = 4 << 20;      // of YAML of all files
+  static constexpr size_t kMostEntries = 1'000'000;  // of files, counted at each request
 
   explicit ControllerFiles(const ResourceFinder& resources) : resources_(resources) {}
   // For another load: files may have changed.

@@ -110,7 +110,7 @@ fs::path newest_version(const fs::path& model) {
   return newest > 0 ? model / std::to_string(newest) : model;
 }
 
-// The name in a ROS package's manifest; "" if there is none that can be read.
+// The name in a ROS package's manifest; "" without a readable one.
 std::string package_name(const fs::path& folder) {
   const fs::path manifest = folder / "package.xml";
   if (!is_there(manifest)) return "";

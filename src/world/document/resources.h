@@ -76,7 +76,7 @@ class ResourceFinder {
       packages_;  // by folder: packages by name, filled on first use
 };
 
-// The folder of the worlds and robots that come with Ruedo; "" when there is none.
+// The folder of the worlds and robots that come with Ruedo; "" if not installed.
 std::string shipped_worlds();
 
 }  // namespace ruedo::world

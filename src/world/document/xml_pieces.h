@@ -34,7 +34,7 @@ class XmlPieces {
   bool next(XmlPiece& piece);
 
  private:
-  size_t after(size_t at, std::string_view what) const;  // npos: there is none
+  size_t after(size_t at, std::string_view what) const;  // npos: not found
   size_t after_space(size_t at) const;
   size_t after_name(size_t at) const;
   char at(size_t place) const { return place < text_.size() ? text_[place] : '\0'; }

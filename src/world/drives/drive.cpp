@@ -47,7 +47,7 @@ ModelJointIndex joint_of(const Element& element, const Model& model) {
 }
 
 // The radius of the wheel on a joint: of the round shapes of its link, and of links fixed to it,
-// measured across the axis. 0: there is none.
+// measured across the axis. 0: no round shape.
 double radius_of(const Model& model, const Joint& joint) {
   std::vector<ModelLinkIndex> links{joint.child};
   for (size_t i = 0; i < links.size(); ++i) {

@@ -29,7 +29,7 @@ struct MeshImport {
   LoadBudget* budget = nullptr;  // for all meshes together; null: none
 };
 
-// The default cache folder; "" if there is none.
+// The default cache folder; "" without one.
 std::string mesh_cache_folder();
 
 class MeshLoader {

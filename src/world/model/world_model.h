@@ -228,7 +228,7 @@ struct DriveDescription {
       odometry;  // <ruedo:odometry>; null: ideal encoders, arc integrator
 };
 
-// A detachable joint: holds a link of another model until it is told to release it.
+// A detachable joint: holds a link of another model until a command releases it.
 struct Hold {
   std::string name;
   ModelLinkIndex link;

@@ -329,7 +329,7 @@ Geometry SizedShape::plane() {
   return g;
 }
 
-// The one shape of a <geometry>; nullptr: there is none, or it is <empty/>.
+// The one shape of a <geometry>; nullptr: without one, or for <empty/>.
 const Element* shape_of(const Element& element) {
   const Element* shape = nullptr;
   for (const auto& child : element.children) {

@@ -574,7 +574,7 @@ class SdfReader::WorldReader {
     frames_.add(std::move(node));
   }
 
-  // A model without a link is none.
+  // Ignores a model without a link.
   void place(std::shared_ptr<const ScopedModel> scope, std::string name, const Element& by) {
     if (!scope) return;
     if (frames_.has(name)) {

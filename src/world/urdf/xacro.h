@@ -17,7 +17,7 @@ bool is_xacro(const std::string& path, const Element* root);
 // The Python interpreter that expands it: a path, or a name to be found in PATH.
 std::string xacro_python();
 
-// The interpreter itself, then what it reads of its own; empty where there is none.
+// The interpreter, then the files that it reads of its own; empty without one.
 std::vector<std::string> xacro_parts();
 
 // The expanded <robot>; its elements keep the original files and lines. $(find PKG) finds packages

@@ -48,7 +48,7 @@ class Names {
   };
   std::vector<TfTree> tf_trees(const std::string& robot) const;
 
-  // Throws InputError if a remap names no topic that was asked for until now.
+  // Throws InputError if a remap names no topic that was used so far.
   void check_remaps();
 
  private:

@@ -84,7 +84,7 @@ class Entities {
   void update(std::shared_ptr<const world::WorldModel> world);
   const world::WorldModel* world() const { return world_.get(); }
 
-  // Null: there is none.
+  // Null: unknown.
   const Entity* find(const std::string& name) const;
   // Category, description and tags for as long as the entity is there; false: there is none.
   bool say(const std::string& name, uint8_t category, std::string description,

@@ -32,7 +32,7 @@ class Services {
   // What there is in the run from now on; world: null where it is not known. Any thread.
   void update(const std::vector<world_info_t>& info,
               std::shared_ptr<const world::WorldModel> world);
-  // Of spawned robots, by name, where a client asked for one.
+  // Namespaces of spawned robots, by name, if a client requested one.
   std::map<std::string, std::string> namespaces() const;
 
   std::vector<Topic> list() const;  // names, and "pkg/srv/Name"
@@ -125,7 +125,7 @@ class Services {
   mutable std::mutex mutex_;  // of what follows
   int64_t served_ = 0;        // bitmap of the run's kinds of requests
   Entities entities_;
-  std::multiset<std::string> spawning_;  // the names that the run was asked for
+  std::multiset<std::string> spawning_;  // the names requested from the run
   std::map<std::string, std::string> namespaces_;
 
   ModelChecks checks_;  // the last: its thread calls the above

@@ -146,7 +146,7 @@ Result Services::fault_of(const Order& order) const {
   return {};
 }
 
-// The model is read before the run is asked, so that a fault of it is told as what it is.
+// The model is read before the request, so that the reply reports its faults.
 void Services::spawn(uint64_t client, Order order, Spawned then) {
   if (const Result fault = fault_of(order); fault.code != kOk) return then(fault, "");
   std::string file;
