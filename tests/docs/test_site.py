@@ -171,6 +171,12 @@ def test_each_reader_has_five_links():
         assert len(re.findall(r"^\d\. \[", section, re.MULTILINE)) == 5, reader
 
 
+def test_the_glossary_is_short_and_in_order():
+    text = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
+    words = re.findall(r"^\| ([a-z ]+) \|", text, re.MULTILINE)
+    assert words == sorted(words) and 30 <= len(words) <= 40, len(words)
+
+
 def test_prose_is_short():
     sizes = {
         str(p.relative_to(ROOT)): len(prose(p.read_text(encoding="utf-8")).encode()) for p in PAGES
