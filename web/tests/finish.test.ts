@@ -49,6 +49,16 @@ describe("the finish of a surface", () => {
     expect(map!.anisotropy).toBe(1);
   });
 
+  it("has the picture on all surfaces that share it", () => {
+    const picture = new THREE.Texture(),
+      meshes = [0, 1].map(() => meshOf(new THREE.MeshStandardMaterial({ map: picture })));
+    for (const mesh of meshes) setFinish(mesh, true);
+    picture.image = { width: 1, height: 1 };
+    arrived(picture);
+    for (const mesh of meshes)
+      expect((mesh.material as unknown as THREE.MeshLambertMaterial).map!.version).toBe(1);
+  });
+
   it("is one alone for what has no gloss to lose", () => {
     const mesh = meshOf(new THREE.MeshLambertMaterial());
     const material = mesh.material;
