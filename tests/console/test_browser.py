@@ -452,6 +452,8 @@ SLAB = """<sdf version="1.9"><world name="slab"><include><uri>model://sun</uri><
 <collision name="c"><geometry><box><size>9 9 0.2</size></box></geometry></collision>
 <visual name="v"><geometry><box><size>9 9 0.2</size></box></geometry></visual></link></model>
 <audio device="default"/>
+<model name="gone"><static>1</static><link name="l"><visual name="v"><geometry><mesh><uri>gone.stl</uri>
+</mesh></geometry></visual></link></model>
 <include><uri>model://p3dx</uri><pose>-2 -1 0 0 0 0</pose></include>
 <include><uri>model://p3dx</uri><name>falling</name><pose>7 0 0 0 0 0</pose></include>
 </world></sdf>"""

@@ -5,6 +5,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
   await ready();
   const noted = (what, words) =>
     until(what, (text) => window.notes.some((note) => new RegExp(text).test(note)), words);
+  await noted("what is missing in the world is told", "^Parts of this world are missing");
   await noted("a robot that fell is told", "^falling has fallen out of the world");
   await page.locator("#canvas").focus();
   await page.keyboard.press(" ");

@@ -2,7 +2,7 @@
 // first, as toasts disappear.
 import { clockText } from "../state/clock";
 import type { Page, PageState } from "../state/page";
-import { h, onToast } from "../widgets/elements";
+import { h, onToast, toast } from "../widgets/elements";
 
 const kMost = 500;
 
@@ -10,6 +10,7 @@ export class Notes {
   readonly element: HTMLElement;
   private readonly list = h("ol", { class: "notes", id: "notes" });
   private readonly warnings = h("ol", { class: "notes", id: "warnings" });
+  private isFaulty = false; // of the shown world, and it was said
   private readonly none = h("p", { class: "dim" }, "Nothing was said so far.");
 
   constructor(page: Page) {
@@ -38,6 +39,10 @@ export class Notes {
   }
 
   private showWarnings(warnings: PageState["warnings"]): void {
+    const isFaulty = warnings.some(({ kind }) => kind === "error");
+    if (isFaulty && !this.isFaulty)
+      toast("Parts of this world are missing or faulty: see Notes.", "error");
+    this.isFaulty = isFaulty;
     const lines = warnings.map(({ kind, text }) =>
       h("li", { class: kind === "error" ? "error" : "" }, h("b", {}, kind), ` ${text}`),
     );
