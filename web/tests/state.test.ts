@@ -6,6 +6,7 @@ import { shownRobots, stateWords, type PageState } from "../src/state/page";
 import { Store } from "../src/state/store";
 import { wantedChannels } from "../src/state/wanted";
 import type { World } from "../src/state/world";
+import { decimals } from "../src/widgets/elements";
 
 const kTypes = [
   "pose_t",
@@ -256,4 +257,14 @@ describe("how a layer is drawn", () => {
       expect(displaysOf(JSON.stringify([["a", { ...usual, ...wrong }]])).size).toBe(0);
     expect(displaysOf("{").size).toBe(0);
   });
+});
+
+it("a number that is shown as zero has no sign", () => {
+  expect([-4e-4, 4e-4, -6e-4, -0].map((value) => decimals(value, 3))).toEqual([
+    "0.000",
+    "0.000",
+    "-0.001",
+    "0.000",
+  ]);
+  expect([decimals(-0.4, 0), decimals(-10.04, 1)]).toEqual(["0", "-10.0"]);
 });

@@ -4,14 +4,13 @@ import type { Page } from "../state/page";
 import type { Stage } from "../scene/stage";
 import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
-import { h, say } from "../widgets/elements";
+import { decimals, h, say } from "../widgets/elements";
 
 const kNoFrame = new Set(["odometry", "pose", "motion", "collisions", "joints"]);
 const kMostLinks = 200;
 const kPeriod_ms = 200;
 
-const number = (value: number, unit: string) =>
-  `${(Math.abs(value) < 5e-4 ? 0 : value).toFixed(3)} ${unit}`;
+const number = (value: number, unit: string) => `${decimals(value, 3)} ${unit}`;
 
 // "1.000 m, 0.000 m, 0.200 m, turned 90.0°"
 export function poseWords(position: ArrayLike<number>, orientation: ArrayLike<number>): string {

@@ -1,7 +1,7 @@
 // The joints of the chosen robot: their positions, and a slider for each that can be moved, between
 // the joint's limits.
 import type { joint_state_t } from "../../generated/messages";
-import { h, say } from "../widgets/elements";
+import { decimals, h, say } from "../widgets/elements";
 import type { JointDescription } from "../wire/description";
 
 const kReach = Math.PI, // to both sides, of a joint without limits: rad or m
@@ -39,7 +39,7 @@ export class JointTable {
       const row = this.rows.get(name);
       if (!row) return;
       [joint_position, joint_velocity, joint_effort].forEach((values, column) =>
-        say(row.values[column]!, values[i]!.toFixed(3)),
+        say(row.values[column]!, decimals(values[i]!, 3)),
       );
       if (row.slider && !row.moved) row.slider.value = String(joint_position[i]);
     });
@@ -69,7 +69,7 @@ export class JointTable {
         h(
           "tr",
           {},
-          h("th", {}, name),
+          h("th", {}, ...name.split(/(?<=_)/).flatMap((part) => [part, h("wbr")])),
           ...row.values,
           h("td", { class: "dim" }, unit),
           slider && h("td", {}, slider, h("div", { class: "dim range" }, range)),

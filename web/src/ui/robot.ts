@@ -14,7 +14,7 @@ import {
   type sonar_t,
 } from "../../generated/messages";
 import { textOf } from "../widgets/text";
-import { h, say } from "../widgets/elements";
+import { decimals, h, say } from "../widgets/elements";
 import { JointTable, type JointActions } from "./joints";
 import { makeMoveForm } from "./move_form";
 import type { Move } from "../state/go_to";
@@ -40,7 +40,7 @@ export type PastOdometry = Pick<odometry_t, "x" | "y" | "theta" | "v" | "omega">
 const kStates = ["idle", "running", "done", "ended", "refused"];
 const kFacts = ["drive", "pose", "speed", "odometry", "odometry error", "motion", "runs into"];
 const kLevel_m = 0.5; // smaller heights, up or down, are not shown
-const fixed = (value: number) => (Math.abs(value) < 5e-4 ? 0 : value).toFixed(3);
+const fixed = (value: number) => decimals(value, 3);
 
 const kKinds: Record<number, string> = {
   1: "advance",
@@ -51,8 +51,8 @@ const kKinds: Record<number, string> = {
   [motion_status_t.KIND_VELOCITY]: "velocity",
   [motion_status_t.KIND_WHEELS]: "wheels",
 };
-const shortly = (values: Iterable<number>) => [...values].map((v) => v.toFixed(2)).join(", ");
-const degrees = (rad: number) => `${((rad * 180) / Math.PI).toFixed(1)}°`;
+const shortly = (values: Iterable<number>) => [...values].map((v) => decimals(v, 2)).join(", ");
+const degrees = (rad: number) => `${decimals((rad * 180) / Math.PI, 1)}°`;
 const heading = (rad: number) => degrees(wrap(rad)); // all headings in the same range, -180 to 180
 const yawOf = (q: ArrayLike<number>) =>
   Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
@@ -202,7 +202,7 @@ export class RobotPages {
 
   odometry(m: odometry_t): void {
     const t = Number(m.utime) * 1e-6;
-    this.fact("odometry", `${m.x.toFixed(3)} m, ${m.y.toFixed(3)} m, ${heading(m.theta)}`);
+    this.fact("odometry", `${fixed(m.x)} m, ${fixed(m.y)} m, ${heading(m.theta)}`);
     this.plotOdometry(t, m);
     this.reckoned = m;
     this.compare();

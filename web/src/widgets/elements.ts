@@ -21,6 +21,10 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
+// Without a sign where it is shown as zero.
+export const decimals = (value: number, digits: number) =>
+  value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+
 // Sets a text only if it differs: most values do not change.
 export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
