@@ -136,8 +136,8 @@ const tools = {
   },
   // Waits for a line from who started this.
   told: async () => (await lines.next()).value,
-  // Waits until a condition in the page holds. A working page reaches no limit, however slow the
-  // machine.
+  // Waits until a condition in the page holds: a function, since the page evaluates no texts. A
+  // working page reaches no limit, however slow the machine.
   until: (what, test, argument) =>
     page.waitForFunction(test, argument, { timeout: kPatience_ms, polling: 100 }).then(
       () => {

@@ -73,14 +73,20 @@ export default async function past({ page, seen, until, check, ready, server, pi
   check("(and the page stays)", Math.abs((await pose()) - begin.x) < 0.02);
   await page.locator("#timeline button").first().click();
   await until("the past plays on", (t) => window.ruedo.page.now.past.now > t + 0.3, begin.time);
-  const trail = () => {
-    const { points } = window.ruedo.overlays.of.get("p3at").truth;
-    return points.length / 3 > 15 ? Math.max(...points.filter((_, i) => i % 3 === 0)) : NaN;
-  };
+  // A page that was starved has seen few of its points.
+  const hasTrail = (what) =>
+    until(
+      what,
+      (x) => {
+        const { points } = window.ruedo.overlays.of.get("p3at").truth;
+        return points.length > 6 && Math.max(...points.filter((_, i) => i % 3 === 0)) > x + 0.4;
+      },
+      begin.x,
+    );
   await scrub(await page.evaluate(() => window.ruedo.page.now.kept.end));
-  await until("its trail is that of what was before", `(${trail})() > ${begin.x + 0.4}`);
+  await hasTrail("its trail is that of what was before");
   await page.keyboard.press(",");
-  await until("(and after a step back)", `(${trail})() > ${begin.x + 0.4}`);
+  await hasTrail("(and after a step back)");
   await scrub(begin.time);
   await page.locator("#canvas").focus();
   const isPlaying = () => window.ruedo.page.now.past.playing;

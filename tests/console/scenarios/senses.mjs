@@ -190,7 +190,14 @@ export default async function senses({ page, until, check, seen, ready, picture 
   for (const by of ["range", "intensity", "plain"]) {
     const before = await page.evaluate(colours);
     await page.getByLabel("coloured by").selectOption(by);
-    await until(`and coloured by ${by}`, `(${colours})() !== ${JSON.stringify(before)}`);
+    await until(
+      `and coloured by ${by}`,
+      (was) => {
+        const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR");
+        return object.geometry.getAttribute("color").array.slice(0, 300).join() !== was;
+      },
+      before,
+    );
   }
   await page.getByLabel("points stay, s").fill("4");
   await until("points stay for a while, in their places", () => {
