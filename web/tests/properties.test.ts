@@ -1,7 +1,15 @@
 // Properties of a model in its text; messages that people write; parts of the time line.
 import { describe, expect, it } from "vitest";
-import { propertiesOf, withColour, withMass, withStatic } from "../src/edit/properties";
-import { boxModel, cylinderModel, sphereModel, wallModel } from "../src/edit/sdf";
+import {
+  attributeOf,
+  propertiesOf,
+  textIn,
+  withColour,
+  withMass,
+  withStatic,
+  withText,
+} from "../src/edit/properties";
+import { boxModel, cylinderModel, places, sphereModel, wallModel } from "../src/edit/sdf";
 import { spanOf, zoomed } from "../src/state/time";
 import { blankOf, checkedMessage } from "../src/wire/as_text";
 import { decode, encode } from "../src/wire/lcm";
@@ -22,6 +30,20 @@ describe("a model's properties", () => {
     const wall = propertiesOf(wallModel("w", 3, { height: 1, thickness: 0.1 }));
     expect([wall.isStatic, wall.mass, wall.size]).toEqual([true, null, [3, 0.1, 1]]);
     expect(() => propertiesOf("<sdf><include/></sdf>")).toThrow(/file of its own/);
+  });
+
+  it("are any element's text, and the rest stays as it was written", () => {
+    const model = (uri: string) =>
+      `<sdf><!-- a --><model name='m'><link name="l &amp; k"><uri>${uri}</uri><self/><x> <!-- b --> 1</x></link></model></sdf>`;
+    expect(withText(model("a&lt;b"), [0, 0], " c & <d> ")).toBe(model("c &amp; &lt;d>"));
+    const link = places(model("a &lt; b"))[0]!.children[0]!.children[0]!,
+      [uri, empty, remarked] = link.children.map((place) => textIn(model("a &lt; b"), place));
+    expect([uri, empty, remarked]).toEqual(["a < b", null, null]);
+    expect(attributeOf(link.tag, "name")).toBe("l &amp; k");
+    expect(() => withText(model("a"), [0, 1], "1")).toThrow("<self> has no text");
+    expect(withText(model("1 2"), [0, 0], "3 -1e-2")).toBe(model("3 -1e-2"));
+    for (const odd of ["much", "3", "3 x", ""])
+      expect(() => withText(model("1 2"), [0, 0], odd)).toThrow("<uri> takes 2 numbers");
   });
 
   it("change alone", () => {

@@ -204,6 +204,29 @@ export default async function edit({ page, seen, until, check, picture, still, o
   await becomes("a mass", /<mass>20<\/mass>/);
   await property("colour").fill("#ff8000");
   await becomes("a colour", /<diffuse>1 0\.502 0 1<\/diffuse>/);
+  await page.locator("#elements > summary").click();
+  const branch = (name) =>
+    page.locator("#elements details > summary").filter({ hasText: name }).first();
+  for (const name of [/^collision box$/, /^surface$|^geometry$/, /^box$/])
+    if (!(await branch(name).evaluate(({ parentElement }) => parentElement.open)))
+      await branch(name).click();
+  const size = page.locator('#elements [data-element="size"]').filter({ visible: true }).first();
+  await size.fill("0.5 0.3 0.8");
+  await size.press("Tab");
+  await becomes("any element", /<collision[^]*<size>0\.5 0\.3 0\.8<\/size>[^]*<visual/);
+  await size.fill("much");
+  await size.press("Tab");
+  await until("what cannot be is refused in words", () =>
+    window.notes.some((note) => /<size> takes 3 numbers/.test(note)),
+  );
+  await until(
+    "(and taken back)",
+    () => document.querySelector('#elements [data-element="size"]')?.value === "0.5 0.3 0.8",
+  );
+  await size.fill("0.5 0.4 0.8");
+  await size.press("Tab");
+  await becomes("(and back)", /<collision[^]*<size>0\.5 0\.4 0\.8<\/size>[^]*<visual/);
+  await page.locator("#elements > summary").click();
   await property("static").check();
   await becomes("fixed", /<static>true<\/static>/);
   await property("static").uncheck();

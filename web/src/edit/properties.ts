@@ -78,6 +78,46 @@ export function withStatic(xml: string, on: boolean): string {
   return changed(xml, [[top.inside, top.inside, `\n      <static>${on}</static>`]]);
 }
 
+// ---- any element
+
+const kEntities: Record<string, string> = {
+  "&lt;": "<",
+  "&gt;": ">",
+  "&quot;": '"',
+  "&apos;": "'",
+  "&amp;": "&",
+};
+
+// The text of an element without others inside; null if it has none that can be changed.
+export function textIn(xml: string, { tag, inside, past }: Place): string | null {
+  const raw = xml.slice(inside, past);
+  if (tag.endsWith("/>") || raw.includes("<")) return null; // empty, or with a comment
+  return raw.trim().replace(/&(lt|gt|quot|apos|amp);/g, (entity) => kEntities[entity]!);
+}
+
+// "" if the tag has none of that name.
+export const attributeOf = (tag: string, name: string) =>
+  new RegExp(`\\s${name}\\s*=\\s*(["'])(.*?)\\1`).exec(tag)?.[2] ?? "";
+
+// How many numbers a text is a list of; 0: it is something else.
+function numbersIn(text: string): number {
+  const parts = text.trim().split(/\s+/);
+  return parts.every((part) => part !== "" && Number.isFinite(Number(part))) ? parts.length : 0;
+}
+
+// What is a list of numbers remains one of as many. path: the places among the children, from the
+// model on. Throws, with the reason.
+export function withText(xml: string, path: readonly number[], text: string): string {
+  const place = path.reduce((at, i) => at.children[i]!, topModel(xml));
+  const before = textIn(xml, place);
+  if (before === null) throw new Error(`<${place.name}> has no text`);
+  const count = numbersIn(before);
+  if (count > 0 && numbersIn(text) !== count)
+    throw new Error(`<${place.name}> takes ${count === 1 ? "a number" : `${count} numbers`}`);
+  const written = text.trim().replace(/&/g, "&amp;").replace(/</g, "&lt;");
+  return changed(xml, [[place.inside, place.past, written]]);
+}
+
 // Of several links each keeps its share. Moments of inertia go with the mass.
 export function withMass(xml: string, mass: number): string {
   const top = topModel(xml),

@@ -1,4 +1,5 @@
-// The selected model's properties: name, whether it is fixed, colour, size and mass.
+// The selected model's properties: name, whether it is fixed, colour, size and mass; and all of its
+// elements.
 import type { Editor } from "../edit/editor";
 import {
   propertiesOf,
@@ -10,6 +11,7 @@ import {
 import type { Size } from "../edit/sdf";
 import type { Page } from "../state/page";
 import { h, say, toast } from "../widgets/elements";
+import { ElementTree } from "./element_tree";
 
 const kLargest_m = 1000,
   kHeaviest_kg = 1e6;
@@ -29,6 +31,7 @@ export class PropertyList {
   );
   private readonly words = h("p", { class: "dim" });
   private readonly rows: Record<"name" | "colour" | "size" | "mass" | "static", HTMLElement>;
+  private readonly tree = new ElementTree((what, by) => this.change(what, by));
   private shown: Properties | null = null;
   private asked = 0;
   private pending = 0; // edits that the server has not answered yet
@@ -46,7 +49,13 @@ export class PropertyList {
       mass: row("mass, kg", this.mass),
       static: h("label", { class: "check" }, this.fixed, "fixed: it never moves"),
     };
-    this.element = h("div", { id: "properties" }, ...Object.values(this.rows), this.words);
+    this.element = h(
+      "div",
+      { id: "properties" },
+      ...Object.values(this.rows),
+      this.words,
+      this.tree.element,
+    );
     this.listen();
     page.watch(["selected", "scene", "shown"], () => void this.show());
   }
@@ -62,21 +71,23 @@ export class PropertyList {
     });
   }
 
+  private change(what: string, by: (xml: string) => string): void {
+    void this.settle(this.editor.change(this.page.now.selected, what, by));
+  }
+
   private listen(): void {
-    const change = (what: string, by: (xml: string) => string) =>
-      void this.settle(this.editor.change(this.page.now.selected, what, by));
     this.name.addEventListener("change", () => void this.rename());
     this.fixed.addEventListener("change", () => {
       const on = this.fixed.checked;
-      change(on ? "fix" : "let move", (xml) => withStatic(xml, on));
+      this.change(on ? "fix" : "let move", (xml) => withStatic(xml, on));
     });
     this.colour.addEventListener("change", () => {
       const hex = this.colour.value;
-      change("colour", (xml) => withColour(xml, hex));
+      this.change("colour", (xml) => withColour(xml, hex));
     });
     this.mass.addEventListener("change", () => {
       const mass = this.mass.valueAsNumber;
-      if (this.isGood(this.mass)) change("mass", (xml) => withMass(xml, mass));
+      if (this.isGood(this.mass)) this.change("mass", (xml) => withMass(xml, mass));
     });
     this.sizes.forEach((field, i) =>
       field.addEventListener("change", () => {
@@ -120,8 +131,10 @@ export class PropertyList {
     ++this.pending;
     const good = await edit;
     --this.pending;
-    if (!good) this.fill();
-    else if (!this.pending) await this.show();
+    if (!good) {
+      this.fill();
+      this.tree.draw();
+    } else if (!this.pending) await this.show();
   }
 
   private async show(): Promise<void> {
@@ -140,6 +153,7 @@ export class PropertyList {
     }
     say(this.words, words);
     this.fill();
+    this.tree.show(this.shown && text);
   }
 
   private fill(): void {
