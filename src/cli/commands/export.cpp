@@ -50,9 +50,9 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
     if (!told && log.offset() > kForetells) {
       told = true;
       const double share = static_cast<double>(size()) / static_cast<double>(log.offset());
-      to_stderr("ruedo: {} of {:.1f} GB: what is written will be about {:.1f} GB\n", path,
-                static_cast<double>(log.size()) * 1e-9,
-                share * static_cast<double>(log.size()) * 1e-9);
+      const double megabytes = static_cast<double>(log.size()) * 1e-6;
+      to_stderr("ruedo: {} has {:.0f} MB; what is written will have about {:.0f} MB\n", path,
+                megabytes, share * megabytes);
     }
     now_us = std::max(now_us, event.timestamp_us);  // as in the index: times never go back
     if (const auto* next = &worlds.at(now_us); next != scene) {
