@@ -89,7 +89,7 @@ def test_4097_by_4097_loads_in_seconds_and_500_mb(large):
         text=True,
         timeout=300,
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0 and "left out" not in done.stderr, done.stderr
     seconds, kilobytes = map(float, re.search(r"used (\S+) (\S+)", done.stdout).groups())
     assert kilobytes < 500e3, kilobytes
     assert seconds < 6, seconds  # of CPU time: 3 s on a machine that does nothing else
