@@ -9,7 +9,7 @@
 #include <numeric>
 #include <span>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 #include "ruedo/quantity.h"

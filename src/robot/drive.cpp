@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 
 namespace ruedo::robot {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "physics/state_check.h"
 #include "robot/base_motion.h"
 #include "ruedo/math.h"

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "base/whole.h"
 
 namespace ruedo::robot {

@@ -16,7 +16,7 @@
 
 #include <fmt/format.h>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "base/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/lidar_t.hpp"

@@ -24,7 +24,7 @@
 #include <iterator>
 #include <optional>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "base/whole.h"
 #include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"

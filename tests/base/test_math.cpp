@@ -14,7 +14,7 @@
 #include <mpfr.h>
 #include <Eigen/Geometry>
 
-#include "base/sincos.h"
+#include "base/math/sincos.h"
 #include "ruedo/random.h"
 
 namespace ruedo {

@@ -27,7 +27,9 @@ TEST(Costs, TrianglesOfAllMeshesAreBounded) {
   folder.write("hills.pgm", "P5 8193 8193 255\n" + std::string(8193 * 8193, '\x40'));
   std::string models;
   for (int i = 0; i < 4; ++i) {
-    if (i == 3) EXPECT_EQ(error_of(folder.write("three.sdf", world_around(models))), "");
+    if (i == 3) {
+      EXPECT_EQ(error_of(folder.write("three.sdf", world_around(models))), "");
+    }
     models += "<model name='m" + std::to_string(i) +
               "'><static>true</static><link name='l'><collision name='c'><geometry><heightmap>"
               "<uri>hills.pgm</uri></heightmap></geometry></collision></link></model>\n";

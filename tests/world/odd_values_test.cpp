@@ -181,12 +181,11 @@ TEST(OddValues, PluginsOfModelsInAWorld) {
 }
 
 TEST(OddValues, FramesThatAreNowhere) {
-  EXPECT_THAT(
-      named("<frame name='a' attached_to='b'/><frame name='b' attached_to='a'/>"),
-      ElementsAre("<frame>: 'a' is placed relative to itself, through other frames; the "
-                  "frame is left out",
-                  "<frame>: 'b' is placed relative to itself, through other frames; the "
-                  "frame is left out"));
+  EXPECT_THAT(named("<frame name='a' attached_to='b'/><frame name='b' attached_to='a'/>"),
+              ElementsAre("<frame>: 'a' is placed relative to itself, through other frames; the "
+                          "frame is left out",
+                          "<frame>: 'b' is placed relative to itself, through other frames; the "
+                          "frame is left out"));
 }
 
 TEST(OddValues, StatesOfWhatIsNotThere) {

@@ -1,8 +1,8 @@
 // What a program of a textbook uses, in C++; api.py and Api.java are its twins.
+#include <ruedo/client.h>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ruedo/client.h>
 
 using namespace std::chrono_literals;
 namespace rc = ruedo::client;
