@@ -57,7 +57,23 @@ export default async function panels({ page, until, check, ready, still, picture
   );
   const lane = await page.locator("#events").boundingBox();
   await page.mouse.move(lane.x + lane.width / 2, lane.y + 5);
-  for (let i = 0; i < 4; ++i) await page.mouse.wheel(0, -100);
+  const length = () =>
+    page.evaluate(() => {
+      const { span } = window.ruedo.page.now;
+      return span ? span.end - span.begin : 1e9;
+    });
+  for (let i = 0; i < 4; ++i) {
+    const before = await length();
+    await page.mouse.wheel(0, -100);
+    await until(
+      "(a turn of the wheel came)",
+      (before) => {
+        const { span } = window.ruedo.page.now;
+        return span !== null && span.end - span.begin < before;
+      },
+      before,
+    );
+  }
   await until("the wheel zooms the time line", () => {
     const { min, max } = document.getElementById("scrub"),
       { kept } = window.ruedo.page.now;
