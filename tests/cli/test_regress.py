@@ -214,7 +214,7 @@ def test_clearance_is_exact(tmp_path, monkeypatch, gap, asked, told):
         assert done.returncode == 0, done
     else:
         assert done.returncode == 1 and told in done.stderr, done
-        assert f"at least {asked} m are asked for" in done.stderr
+        assert f"at least {asked} m are required" in done.stderr
     metrics = json.loads((tmp_path / "verdict.json").read_text())["metrics"]
     if asked == "0.1":
         assert metrics["clearance_m"] == pytest.approx(gap, abs=1e-5)

@@ -208,7 +208,7 @@ def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
     write(tmp_path / "both.lcm", found)
     result = program("verify", tmp_path / "both.lcm")
     assert result.returncode == 4
-    assert result.stdout.startswith("not as in the log: ") and "may be why" in result.stdout
+    assert result.stdout.startswith("not as in the log: ") and "may be the cause" in result.stdout
 
 
 def test_another_cpu_or_c_library_is_no_excuse(tmp_path):

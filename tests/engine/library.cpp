@@ -40,7 +40,7 @@ void look(const std::string& world) {
   options.worlds = 2;
   options.noise = false;
   options.disable = {"p3at/camera"};
-  options.settings = {{"p3at/LRF.update_rat", 10}};
+  options.settings = {{"p3at/lrf.update_rat", 10}};
   expect_error<ruedo::InputError>([&] { ruedo::Engine(world, options); },
                                   "did you mean 'update_rate'?");
   options.settings = {};

@@ -413,7 +413,7 @@ def test_a_robot_that_waits_comes_through_a_crowd():
 def test_wrong_numbers_of_people_are_refused():
     with pytest.raises(ValueError, match="people is 51; allowed are 0 to 50"):
         ruedo.gym.CrowdVectorEnv(1, people=51)
-    with pytest.raises(TypeError, match="no obstacles"):
+    with pytest.raises(TypeError, match="no option obstacles"):
         ruedo.gym.CrowdVectorEnv(1, obstacles=3)
 
 

@@ -187,15 +187,18 @@ export default async function edit({ page, seen, until, check, picture, still, o
       ["size-x", "size-y", "size-z"].map(value).join() === "0.4,0.4,0.8"
     );
   });
-  const becomes = (what, pattern) =>
-    until(
-      what,
-      async (source) => {
+  // Not by until(), which takes the promise of the text for the answer.
+  const becomes = async (what, pattern) => {
+    const textOfSelected = () =>
+      page.evaluate(async () => {
         const { editor, page } = window.ruedo;
-        return new RegExp(source).test((await editor.textOf(page.now.selected)) ?? "");
-      },
-      pattern.source,
-    );
+        return (await editor.textOf(page.now.selected)) ?? "";
+      });
+    const end = performance.now() + 60_000;
+    let text = await textOfSelected();
+    while (!pattern.test(text) && performance.now() < end) text = await textOfSelected();
+    check(what, pattern.test(text), text);
+  };
   await property("size-x").fill("0.5");
   await property("size-x").press("Tab");
   await becomes("a size in metres", /<size>0\.5 0\.4 0\.8<\/size>/);

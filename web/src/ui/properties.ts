@@ -35,6 +35,8 @@ export class PropertyList {
   private shown: Properties | null = null;
   private asked = 0;
   private pending = 0; // edits that the server has not answered yet
+  // What is being typed: an answer to an earlier edit would take it back.
+  private readonly typed = new Set<HTMLInputElement>();
 
   constructor(
     private readonly page: Page,
@@ -76,6 +78,11 @@ export class PropertyList {
   }
 
   private listen(): void {
+    for (const field of [this.name, this.mass, ...this.sizes]) {
+      field.addEventListener("input", () => this.typed.add(field));
+      for (const end of ["change", "blur"])
+        field.addEventListener(end, () => this.typed.delete(field));
+    }
     this.name.addEventListener("change", () => void this.rename());
     this.fixed.addEventListener("change", () => {
       const on = this.fixed.checked;
@@ -159,7 +166,10 @@ export class PropertyList {
   private fill(): void {
     const { shown } = this,
       { size, mass, colour } = shown ?? {};
-    this.name.value = this.page.now.selected;
+    const put = (field: HTMLInputElement, value: string) => {
+      if (!this.typed.has(field)) field.value = value;
+    };
+    put(this.name, this.page.now.selected);
     this.rows.name.hidden = shown === null;
     this.rows.static.hidden = shown === null;
     this.rows.colour.hidden = shown === null;
@@ -167,9 +177,9 @@ export class PropertyList {
     this.rows.mass.hidden = mass === undefined || mass === null || (shown?.isStatic ?? true);
     this.fixed.checked = shown?.isStatic ?? false;
     this.colour.value = colour ?? "#808080";
-    this.mass.value = mass ? String(Number(mass.toPrecision(5))) : "";
-    this.sizes.forEach((field, i) => {
-      field.value = size ? String(Number(size[i]!.toPrecision(6))) : "";
-    });
+    put(this.mass, mass ? String(Number(mass.toPrecision(5))) : "");
+    this.sizes.forEach((field, i) =>
+      put(field, size ? String(Number(size[i]!.toPrecision(6))) : ""),
+    );
   }
 }
