@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <new>
 
 #include <BulletCollision/CollisionDispatch/btBoxBoxDetector.h>
@@ -226,13 +227,9 @@ double rounded_off(const btConvexShape& shape) {
   return has_edges ? kOfACorner * shape.getMargin() : 0.0;
 }
 
-// Of the real edges.
+// Infinitely far apart: also the real edges are farther than `reach`.
 ClosestPoints points_within(double reach, const PlacedShape& a, const PlacedShape& b) {
-  ClosestPoints closest = closest_points(a, b, reach + rounded_off(a.shape) + rounded_off(b.shape));
-  const btVector3& n = closest.normal;
-  if (!n.isZero())
-    closest.distance = n.dot(farthest_point(a.shape, a.X, -n) - farthest_point(b.shape, b.X, n));
-  return closest;
+  return closest_points(a, b, reach + rounded_off(a.shape) + rounded_off(b.shape));
 }
 
 class BoxOnBox final : public Pair {
@@ -253,7 +250,7 @@ class BoxOnBox final : public Pair {
       };
       const ClosestPoints closest = points_within(seen_ahead_m, placed(a), placed(b));
       if (closest.distance > kAhead_m) {
-        if (closest.distance <= seen_ahead_m)
+        if (!closest.normal.isZero())
           result.addContactPoint(closest.normal, closest.on_b, closest.distance);
         return;
       }
@@ -286,9 +283,11 @@ class ConvexOnConvex final : public Pair {
                              ? gContactBreakingThreshold
                              : seen_ahead_m;
     const ClosestPoints closest = points_within(reach, {of_a, X_WA}, {of_b, X_WB});
-    if (closest.distance > reach) return;
-    if (!closest.normal.isZero())
-      return result.addContactPoint(closest.normal, closest.on_b, closest.distance);
+    if (std::isinf(closest.distance)) return;
+    if (!closest.normal.isZero()) {
+      const btScalar gap = closest.normal.dot(closest.on_a - closest.on_b);
+      return result.addContactPoint(closest.normal, closest.on_b, gap);
+    }
     Deepest deepest{of_a, of_b, X_WA, X_WB};
     deepest.ask_bullet();
     const btVector3 apart = center_before(a, substep_s) - center_before(b, substep_s);

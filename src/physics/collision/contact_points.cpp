@@ -237,7 +237,8 @@ void ContactPoints::find_better_normal(const Placed& a, const Placed& b, Touch& 
     normal /= length;
     const btVector3 on_a = a.farthest(-normal);
     const btScalar gap = normal.dot(on_a - b.farthest(normal));
-    if (gap < touch.gap - kAsGood_m) return false;
+    // Along the same normal it is exact; the closest points' edges are rounded.
+    if (gap < touch.gap - kAsGood_m && normal.dot(touch.normal) < kRounded) return false;
     touch = {normal, on_a - gap * normal, gap, true};
     return true;
   };
