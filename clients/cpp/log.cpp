@@ -36,7 +36,7 @@ class LogReader {
 
   // False at the end, and where the log was cut off, or is damaged.
   bool next();
-  // The next event is one before which there is none of that time or later.
+  // Skips events that are all earlier than that time; maybe not all of them.
   void seek_time(int64_t time_us) {
     next_ = find_log_time(time_us, size_, [this](int64_t offset, uint8_t* into, size_t size) {
       file_.clear();

@@ -53,8 +53,8 @@ std::optional<int64_t> log_event_after(int64_t offset, int64_t end, int64_t size
   return {};
 }
 
-// An event before which there is none of that time or later, and which is close to it: of a log of
-// `size` bytes whose times never go back.
+// The place of an event shortly before that time: all events before it are earlier, too. The log
+// has `size` bytes, and its times never go back.
 template <class ReadAt>
 int64_t find_log_time(int64_t time_us, int64_t size, ReadAt read_at) {
   constexpr int64_t kNear = 1 << 20;  // bytes that are read faster than halved

@@ -36,8 +36,8 @@ class Reader {
   // The next event is that at this byte, where offset() was before one.
   void seek(int64_t offset);
 
-  // The next event is one before which there is none of that time or later, and is close to it: in
-  // a log whose times never go back, found by halves.
+  // Skips nearly all events that are earlier than that time, and no others: finds the place by
+  // halves, in a log whose times never go back.
   void seek_time(SimTime time_us);
 
   // After next() returned false: "" at a proper end, else what is wrong and at which byte.

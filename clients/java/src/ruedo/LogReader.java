@@ -109,7 +109,7 @@ final class LogReader implements AutoCloseable {
         return bytes;
     }
 
-    /** The next event is one before which there is none of that time or later. */
+    /** Skips events that are all earlier than that time; maybe not all of them. */
     void seekTime(long wanted) throws IOException {
         long low = 0; // an event begins here, and is before the time, or the first
         long high = size;

@@ -123,7 +123,7 @@ final class MapFile {
         return values;
     }
 
-    /** NaN where the text is none, or too large. */
+    /** NaN if the text is not a number, or too large. */
     private static double number(String text) {
         try {
             double value = Double.parseDouble(text.trim());
