@@ -155,6 +155,21 @@ def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
     verified(log, world)
 
 
+def test_who_has_read_its_first_line_may_end_it(tmp_path):
+    world, log = tmp_path / "w.sdf", tmp_path / "run.lcm"
+    world.write_text(EMPTY)
+    # The page is opened between the first line and the first step.
+    command = [RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--view"]
+    for _ in range(5):
+        with subprocess.Popen([*command, "--record", log], stdout=subprocess.PIPE) as server:
+            assert server.stdout.readline()
+            server.send_signal(signal.SIGINT)
+            server.stdout.read()
+            assert server.wait(PATIENCE) == 0
+        verified(log, world)
+        log.unlink()
+
+
 def heeds_interrupts(process):
     """Whether it came so far that SIGINT is its own to handle."""
     status = Path(f"/proc/{process.pid}/status").read_text()

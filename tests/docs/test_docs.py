@@ -116,8 +116,7 @@ def serve(command, folder):
             if ready in line:
                 process.send_signal(signal.SIGINT)
         code = process.wait(TIMEOUT_S)
-        # 130: before its first step.
-        assert code in (0, 130) and ready in said, f"{command}: {code}\n{said}"
+        assert code == 0 and ready in said, f"{command}: {code}\n{said}"
 
 
 WORLD = """<sdf version="1.9"><world name="w"><include><uri>model://ground_plane</uri></include>

@@ -224,6 +224,8 @@ int run_world(const RunArguments& arguments) {
       arguments.foxglove ? FoxgloveServer::open(server, arguments.foxglove_address) : nullptr;
   place.claim->describe(
       fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
+  // From the first line on that says so: whoever reads it may end the run, and finds its log.
+  const SignalThread::Serving serving(signals, server);
   std::shared_ptr<void> view;
   const bool is_read = is_printed([&] {
     announce(place);
@@ -240,7 +242,6 @@ int run_world(const RunArguments& arguments) {
   end_progress_line();
   StatusLine status(arguments.quiet);
   server.on_status([&](const run::Status& now) { status.draw(now); });
-  const SignalThread::Serving serving(signals, server);
   const LauncherPipe::Pacing pacing(launcher, server);
   if (node) node->wait_for_peers();
   try {
