@@ -223,6 +223,49 @@ TEST(Articulated, StopsOfAChainAreSolvedAtOnce) {
 
 // A motor without a maximum that drives into a stop gives nothing there, one that holds a load off
 // it gives what the load needs.
+// Base and pendulum swing about their common centre of mass, which stays where it is.
+TEST(Articulated, APendulumOnAnUprightBaseSwingsWithIt) {
+  constexpr double kMass = 1.0, kBase = 2.0, kLength = 0.5, kMoment = 0.01, kStart = 0.02;
+  World w("<model name='m'><pose>0 0 1 0 0 0.7</pose><link name='base'>" +
+              inertial("0 0 0 0 0 0", kBase, 0.1, 0.2, 0.3) +
+              "</link><link name='arm'><pose>0 0 0 0 " + std::to_string(kStart) + " 0</pose>" +
+              inertial("0 0 -0.5 0 0 0", kMass, kMoment, kMoment, kMoment) + "</link>" +
+              hinge("j", "base", "arm", "0 1 0") + "</model>",
+          1000);
+  w.physics.set_support(w.body("m/base"), Support::plane);
+  const double moment = kMoment + kMass * kLength * kLength * (1.0 - kMass / (kMass + kBase));
+  const double period = 2 * M_PI / std::sqrt(kMass * 10 * kLength / moment);
+  const double whole = 2 * kStart * kMass * kLength / (kMass + kBase);  // from end to end, m
+  w.run(std::round(500 * period) / 1000);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), -2 * kStart, 0.005 * kStart);
+  EXPECT_NEAR(w.position("m/base").x(), -whole * std::cos(0.7), 0.005 * whole);
+  EXPECT_NEAR(w.position("m/base").y(), -whole * std::sin(0.7), 0.005 * whole);
+  EXPECT_EQ(w.position("m/base").z(), 1.0);
+}
+
+// A hand on a robot that a drive keeps upright.
+TEST(Articulated, AnUprightBaseCostsNoMoreThanAFreeOne) {
+  constexpr int kFingers = 12, kSteps = 100;
+  std::string hand = "<model name='m'><pose>0 0 1 0 0 0</pose><link name='base'>" +
+                     inertial("0 0 0 0 0 0", 20, 1, 1, 1) + "</link>";
+  for (int i = 0; i < kFingers; ++i) {
+    std::string before = "base";
+    for (int j = 0; j < 4; ++j) {
+      const std::string name = "f" + std::to_string(i) + std::to_string(j);
+      hand += "<link name='" + name + "'><pose>" + std::to_string(0.1 * (j + 1)) + " " +
+              std::to_string(0.05 * i) + " 0 0 0 0</pose>" +
+              inertial("0.05 0 0 0 0 0", 0.1, 0.001, 0.001, 0.001) + "</link>" +
+              hinge("j" + name, before, name, "0 1 0");
+      before = name;
+    }
+  }
+  hand += "</model>";
+  World upright(hand, 5000), falling(hand, 5000);
+  upright.physics.set_support(upright.body("m/base"), Support::plane);
+  constexpr double kFactor = 2.0;  // 4 while its joints were rows
+  EXPECT_LT(upright.seconds_of(kSteps), kFactor * falling.seconds_of(kSteps));
+}
+
 TEST(Articulated, AMotorAtAStopGivesWhatIsNeeded) {
   const auto arm = [](const std::string& limit) {
     return "<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +

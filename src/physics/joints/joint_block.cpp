@@ -107,7 +107,11 @@ bool JointBlocks::make_tree(Block& block, const SolverBodies& bodies) {
       hangs ? *std::find_if(block.joints.begin(), block.joints.end(), on_ground) : block.joints[0];
   Joint& joint = joints_[first];
   if (!hangs) {
-    const int body = joint.a;
+    int body = joint.a;
+    for (const size_t j : block.joints) {
+      for (const int one : {joints_[j].a, joints_[j].b})
+        if (bodies[one].inverse_mass.z() == 0.0) body = one;  // upright: only a root can be
+    }
     block.tree.begin(from_bt(bodies[body].bullet->getCenterOfMassPosition()));
     return block.tree.add_root(body, bodies) && grow(block, body, bodies);
   }

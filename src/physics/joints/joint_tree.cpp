@@ -18,6 +18,12 @@ bool moves_freely(const btRigidBody& body) {
          inverse.y() > 0.0 && inverse.z() > 0.0;
 }
 
+// What a drive keeps upright: it moves in a horizontal plane, and turns about its normal.
+bool moves_in_plane(const btRigidBody& body) {
+  return body.getLinearFactor() == btVector3(1, 1, 0) &&
+         body.getAngularFactor() == btVector3(0, 0, 1);
+}
+
 }  // namespace
 
 void JointTree::begin(const Vec3& about) {
@@ -53,11 +59,17 @@ void JointTree::add_way(const Vec3& angular, const Vec3& linear) {
 }
 
 bool JointTree::add_root(int body, const SolverBodies& bodies) {
-  if (!moves_freely(*bodies[body].bullet)) return false;
+  const btRigidBody& bullet = *bodies[body].bullet;
+  const bool in_plane = moves_in_plane(bullet);
+  if (!in_plane && !moves_freely(bullet)) return false;
+  const double inverse = bodies[body].inverse_inertia(2, 2);
+  if (in_plane && inverse <= 0.0) return false;
   Member& m = add_member(body, bodies);
   m.kind = JointWays::Kind::other;
-  for (int i = 0; i < 3; ++i) add_way(Vec3::Zero(), Vec3::Unit(i));
-  for (int i = 0; i < 3; ++i) add_way(Vec3::Unit(i), m.arm.cross(Vec3::Unit(i)));
+  // As all rows see it: a moment about the normal has that response, others have none.
+  if (in_plane) m.inertia = Vec3(0.0, 0.0, 1.0 / inverse).asDiagonal();
+  for (int i = 0; i < (in_plane ? 2 : 3); ++i) add_way(Vec3::Zero(), Vec3::Unit(i));
+  for (int i = in_plane ? 2 : 0; i < 3; ++i) add_way(Vec3::Unit(i), m.arm.cross(Vec3::Unit(i)));
   return true;
 }
 

@@ -27,7 +27,7 @@ class JointTree {
   static constexpr size_t kNone = static_cast<size_t>(-1);
 
   void begin(const Vec3& about);
-  // The root, if nothing holds it. Returns whether it can be one.
+  // The root, if nothing holds it or a drive keeps it upright. Returns whether it can be one.
   bool add_root(int body, const SolverBodies& bodies);
   // Adds a body that hangs on an added one, or on something immovable. b: the joint's second body,
   // to which the degrees of freedom refer. Returns whether the body can be part of a tree.
