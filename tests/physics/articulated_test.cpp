@@ -266,6 +266,38 @@ TEST(Articulated, AnUprightBaseCostsNoMoreThanAFreeOne) {
   EXPECT_LT(upright.seconds_of(kSteps), kFactor * falling.seconds_of(kSteps));
 }
 
+// A bar of ten links that friction holds, hinged at one end, falls on its light tip: the ground
+// bears the heavy link behind it.
+TEST(Articulated, ALightTipBearsTheBarBehindIt) {
+  const std::string held = "<dynamics><friction>1000000</friction></dynamics>";
+  std::string model = kPlane + "<model name='m'><pose>0 0 0.1 0 0 0</pose>";
+  std::string before = "world";
+  for (int i = 0; i < 10; ++i) {
+    const std::string name = "l" + std::to_string(i);
+    const double mass = i == 8 ? 200.0 : 0.02;
+    model += "<link name='" + name + "'><pose>" + std::to_string(0.1 * i) + " 0 0 0 0 0</pose>" +
+             inertial("0.05 0 0 0 0 0", mass, 1e-3 * mass, 1e-3 * mass, 1e-3 * mass);
+    if (i == 9)
+      model +=
+          "<collision name='c'><pose>0.1 0 0 0 0 0</pose><geometry><box><size>0.04 0.3 0.04"
+          "</size></box></geometry></collision>";
+    model += "</link>" + hinge("j" + name, before, name, "0 1 0", i == 0 ? "" : held);
+    before = name;
+  }
+  World w(model + "</model>", 5000);
+  double bends = 0.0;  // rad/s
+  for (int i = 0; i < 200; ++i) {
+    w.physics.step();
+    for (int j = 1; j < 10; ++j)
+      bends = std::max(bends, std::abs(w.physics.joint_velocity(JointIndex(j))));
+  }
+  EXPECT_LT(bends, 1e-6);
+  // The far lower edge of the tip is on the ground.
+  double sine = 0.0;
+  for (int i = 0; i < 20; ++i) sine = (0.1 - 0.02 * std::sqrt(1.0 - sine * sine)) / 1.02;
+  EXPECT_NEAR(w.position("m/l9").z(), 0.1 - 0.9 * sine, 1e-6);
+}
+
 TEST(Articulated, AMotorAtAStopGivesWhatIsNeeded) {
   const auto arm = [](const std::string& limit) {
     return "<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +

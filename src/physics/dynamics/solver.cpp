@@ -33,7 +33,9 @@ constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps =
 // With friction, sweeps do not converge while few contacts bear the whole load.
 constexpr int kSweepsBeforeSharing = 10;
 constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
-constexpr size_t kFewBodies = 2;         // something immovable and one body: sweeps are faster
+constexpr int kSweepsBeforeJoined = 4,
+              kSweepsBetweenJoined = 10;  // of mechanisms with few contacts
+constexpr size_t kFewBodies = 2;          // something immovable and one body: sweeps are faster
 // Piles in motion are solved to this part of the speed at which they meet and slip, and those that
 // stand to this part of the tolerance: what is left moves them a little in each substep.
 constexpr double kOfSpeed = 1e-3, kStanding = 0.1;
@@ -403,6 +405,8 @@ void Solver::sweep_until_still() {
   tolerance_m_s_ = tolerance();
   double last_square = 0.0, before_newton = 0.0;
   bool after_newton = false, shared = false;
+  bool join =
+      !blocks_.empty() && contact_count_ > 0 && contact_count_ <= JoinedContacts::kMostContacts;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
@@ -422,10 +426,14 @@ void Solver::sweep_until_still() {
       for_each_main_row([this](Row& row) { row.give(bodies_, row.before - row.impulse); });
     }
     if (after_newton) for_each_main_row(start_conjugates);
-    after_newton = i % kSweepsBetweenNewton == first && newton_pays();
+    const bool joined = join && i % kSweepsBetweenJoined == kSweepsBeforeJoined;
+    after_newton = joined || (i % kSweepsBetweenNewton == first && newton_pays());
     if (after_newton) {
       for_each_main_row(start_conjugates);
-      solve_at_once();
+      if (joined)
+        join = solve_joined();
+      else
+        solve_at_once();
       before_newton = worst;
       last_square = 0.0;
     } else {
@@ -493,6 +501,23 @@ bool Solver::newton_pays() {
       contact_count_ > 0 && !blocks_.has_gears() && bodies_.size() > kFewBodies &&
       newton_.prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
   return newton_pays_;
+}
+
+// Returns whether it helps: otherwise it would not the next time.
+bool Solver::solve_joined() {
+  blocks_.sweep(bodies_);
+  joined_.begin();
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    if (contact.normal.inverse == 0.0) continue;
+    joined_.add(contact.normal, contact.along, contact.across, contact.friction, contact.friction2);
+    if (contact.spinning > 0.0) joined_.add(contact.spin, contact.spinning);
+    for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
+      joined_.add(contact.roll[k], contact.rolling);
+  }
+  const bool solved = joined_.solve(bodies_, blocks_, tolerance_m_s_);
+  blocks_.sweep(bodies_);
+  return solved;
 }
 
 void Solver::solve_at_once() {

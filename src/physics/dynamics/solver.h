@@ -23,6 +23,7 @@
 #include "physics/base/bullet.h"
 #include "physics/base/newton.h"
 #include "physics/base/rows.h"
+#include "physics/dynamics/joined_contacts.h"
 #include "physics/dynamics/load_shares.h"
 #include "physics/joints/joint_block.h"
 
@@ -102,6 +103,7 @@ class Solver {
   void go_on_along_conjugates(double& last_square, int sweep);
   bool newton_pays();
   void solve_at_once();
+  bool solve_joined();
   template <class Do>
   void for_each_main_row(Do&& act) {
     for (size_t c = 0; c < contact_count_; ++c) {
@@ -123,6 +125,7 @@ class Solver {
   LoadShares shares_;
   double tolerance_m_s_ = 0.0;  // of this island
   Newton newton_;
+  JoinedContacts joined_;
   bool newton_known_ = false, newton_pays_ = false;  // for this island
   std::vector<std::pair<int, int>> pairs_;           // bodies coupled by rows
 };
