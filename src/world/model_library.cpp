@@ -11,10 +11,14 @@ namespace fs = std::filesystem;
 namespace ruedo::world {
 namespace {
 
+// Not a folder of meshes that other models share, though it has a model.config.
 bool is_model(const fs::path& folder) {
   std::error_code error;
-  return fs::is_regular_file(folder / "model.sdf", error) ||
-         fs::is_regular_file(folder / "model.config", error);
+  try {
+    return fs::is_directory(folder, error) && ResourceFinder::model_file(folder.string());
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 // The subfolders that are models, by name.

@@ -14,7 +14,7 @@ struct ListedModel {
   bool is_robot;     // of Ruedo's robots
 };
 
-// By folder and name, each name once. Reads the folders, and no model.
+// By folder and name, each name once. Reads the folders and each model.config, and no model.
 std::vector<ListedModel> listed_models(const std::string& world_file);
 
 }  // namespace ruedo::world
