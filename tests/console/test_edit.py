@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import shutil
 import struct
 import subprocess
 import time
@@ -364,6 +365,77 @@ def test_what_cannot_be_saved_is_said_first(tmp_path):
         found = said(*arguments, folder=tmp_path)
         assert found[0] == code and words in found[1], (arguments, found)
     assert (tmp_path / "world.sdf").read_text() == "<sdf/>"
+
+
+MODEL = """<sdf version="1.9"><model name="{name}"><static>1</static><link name="l">
+<visual name="v"><geometry><mesh><uri>{mesh}</uri></mesh></geometry></visual></link></model></sdf>"""
+TETRAHEDRON = "solid t\n%sendsolid t\n" % "".join(
+    f"facet normal 0 0 0\nouter loop\n{''.join(f'vertex {corner}' + chr(10) for corner in face)}"
+    "endloop\nendfacet\n"
+    for face in (
+        ("0 0 0", "0 1 0", "1 0 0"),
+        ("0 0 0", "1 0 0", "0 0 1"),
+        ("0 0 0", "0 0 1", "0 1 0"),
+        ("1 0 0", "0 1 0", "0 0 1"),
+    )
+)
+
+
+def drawn(process):
+    """What a page gets of the world's looks."""
+    scene = json.loads(get(process.port, "/scene.json")[1])
+    return [model["name"] for model in scene["models"]], get(process.port, "/scene/meshes")[1]
+
+
+def test_a_world_saved_in_another_folder_opens_the_same(tmp_path, monkeypatch):
+    """With the models and meshes that lie beside the first one. Where they are out of reach, an
+    error comes before anything is edited.
+    """
+    first = tmp_path / "one" / "worlds"
+    for name, mesh, into in (("thing", "t.stl", "models/thing"), ("other", "m/t.stl", ".")):
+        (first / into / mesh).parent.mkdir(parents=True)
+        (first / into / mesh).write_text(TETRAHEDRON)
+        text = MODEL.format(name=name, mesh=mesh)
+        (first / into / "model.sdf").write_text(text)
+    model = re.search("<model.*</model>", text, re.DOTALL)[0]
+    (first / "model.sdf").unlink()
+    (first / "w.sdf").write_text(
+        f"""<sdf version="1.9"><world name="w"><include><uri>model://thing</uri></include>{model}
+</world></sdf>"""
+    )
+    beside, far = tmp_path / "one/elsewhere", tmp_path / "two/worlds"
+    beside.mkdir()
+    far.mkdir(parents=True)
+    for to in (beside, first / "m"):
+        with editing("w.sdf", "--save-as", to / "w.sdf", folder=first) as process:
+            before = drawn(process)
+            assert Client(process.port).ask("SAVE").text == ""
+        with editing("w.sdf", folder=to) as process:
+            assert drawn(process) == before and "thing" in before[0] and len(before[1]) > 100
+        assert listed(to / "w.sdf").returncode == 0
+    code, words = said(first / "w.sdf", "--save-as", "w.sdf", folder=far)
+    path = f"{first / 'm'}:{first / 'models'}"
+    assert code == 2 and f"RUEDO_PATH={path}" in words and not (far / "w.sdf").exists()
+    monkeypatch.setenv("RUEDO_PATH", path)
+    with editing(first / "w.sdf", "--save-as", "w.sdf", folder=far) as process:
+        assert Client(process.port).ask("SAVE").text == ""
+    with editing("w.sdf", folder=far) as process:
+        assert drawn(process) == before
+
+
+def test_a_library_lists_models_only(tmp_path):
+    """Not a folder of meshes that models share, with a model.config that names no model."""
+    shutil.copy(ARENA, tmp_path / "w.sdf")
+    for name, sdf in (("shared", ""), ("lost", "<sdf>gone.sdf</sdf>"), ("good", "<sdf>a.sdf</sdf>")):
+        (tmp_path / "models" / name).mkdir(parents=True)
+        (tmp_path / "models" / name / "model.config").write_text(f"<model>{sdf}</model>")
+    (tmp_path / "models/good/t.stl").write_text(TETRAHEDRON)
+    (tmp_path / "models/good/a.sdf").write_text(MODEL.format(name="good", mesh="t.stl"))
+    with editing("w.sdf", folder=tmp_path) as process:
+        names = [each["name"] for each in json.loads(get(process.port, "/library.json")[1])]
+        assert names[-1] == "good" and not {"shared", "lost"} & set(names)
+        for i in range(len(names)):
+            assert get(process.port, f"/library/{i}/scene.json")[0] == 200
 
 
 def test_a_urdf_is_saved_as_a_world(tmp_path):

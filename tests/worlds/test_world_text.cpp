@@ -280,25 +280,54 @@ TEST(WorldTextTest, SaysWhatTheFileCannotSay) {
   EXPECT_THAT(written.left_out[0], HasSubstr("'r_2'"));
 }
 
+// Files below a folder of this test's own.
+std::filesystem::path folder_with(const std::string& name, const std::vector<std::string>& files) {
+  const auto folder = std::filesystem::canonical(testing::TempDir()) / name;
+  std::filesystem::remove_all(folder);
+  for (const std::string& file : files) {
+    std::filesystem::create_directories((folder / file).parent_path());
+    std::ofstream(folder / file) << "x";
+  }
+  return folder;
+}
+
 TEST(WorldTextTest, PathsLeadToTheSameFilesFromAnotherFolder) {
-  const std::string folder = std::filesystem::temp_directory_path().string();
-  const std::string text =
-      "<sdf><uri>robots/p3dx/model.sdf</uri><uri>model://p3dx</uri><uri>no/such</uri></sdf>";
-  const std::string moved = moved_to(text, kWorlds, folder);
-  EXPECT_THAT(moved, HasSubstr("<uri>model://p3dx</uri><uri>no/such</uri>"));
-  const size_t begin = moved.find("<uri>") + 5;
-  EXPECT_TRUE(std::filesystem::equivalent(
-      std::filesystem::path(folder) / moved.substr(begin, moved.find('<', begin) - begin),
-      kWorlds + "robots/p3dx/model.sdf"));
-  EXPECT_EQ(moved_to(text, kWorlds, kWorlds + "../worlds"), text);
+  const auto folder =
+      folder_with("moved", {"worlds/a/m.dae", "worlds/a/t.png", "worlds/models/box/model.sdf",
+                            "worlds/models/desk/model.sdf", "models/cup/model.sdf",
+                            "worlds/rock.png", "other/README"});
+  const auto sdf = [](const std::string& mesh, const std::string& box, const std::string& desk,
+                      const std::string& rock) {
+    return "<sdf><uri>" + mesh + "</uri><uri>" + box + "</uri><uri>" + desk +
+           "</uri><texture><diffuse>" + rock +
+           "</diffuse></texture><material><diffuse>1 0 0 1</diffuse></material>"
+           "<uri>model://p3dx</uri><uri>model://cup</uri><uri>no/such</uri></sdf>";
+  };
+  const std::string from = folder / "worlds/w.sdf";
+  const std::string text = sdf("a/m.dae", "model://box", "model://desk", "rock.png");
+  // Ruedo has a desk, too; cups are in a folder that both search.
+  const Moved beside = moved_to(text, from, folder / "other/w.sdf");
+  EXPECT_EQ(beside.text, sdf("../worlds/a/m.dae", "../worlds/models/box", "../worlds/models/desk",
+                             "../worlds/rock.png"));
+  EXPECT_TRUE(beside.out_of_reach.empty());
+  EXPECT_EQ(moved_to(text, from, folder / "other/../worlds/v.sdf").text, text);
+}
+
+TEST(WorldTextTest, SaysWhichFoldersAWorldElsewhereDoesNotFind) {
+  const auto folder = folder_with("far", {"one/worlds/a/m.dae", "one/worlds/models/box/model.sdf"});
+  const Moved moved =
+      moved_to("<sdf><uri>a/m.dae</uri><uri>model://box</uri><uri>model://p3dx</uri></sdf>",
+               folder / "one/worlds/w.sdf", folder / "two/worlds/w.sdf");
+  EXPECT_EQ(moved.out_of_reach,
+            (std::set<std::string>{folder / "one/worlds/a", folder / "one/worlds/models"}));
 }
 
 TEST(WorldTextTest, PathsMayHoldWhatXmlEscapes) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "a & <b>";
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "c & d.dae") << "x";
-  EXPECT_EQ(moved_to("<sdf><uri> c &amp; d.dae\n</uri></sdf>", folder, folder.parent_path()),
-            "<sdf><uri>a &amp; &lt;b&gt;/c &amp; d.dae</uri></sdf>");
+  const auto folder = folder_with("escaped", {"a & <b>/c & d.dae"});
+  EXPECT_EQ(
+      moved_to("<sdf><uri> c &amp; d.dae\n</uri></sdf>", folder / "a & <b>/w.sdf", folder / "w.sdf")
+          .text,
+      "<sdf><uri>a &amp; &lt;b&gt;/c &amp; d.dae</uri></sdf>");
 }
 
 TEST(WorldTextTest, ARobotStandsOnAFloorThatReadsBack) {

@@ -82,6 +82,17 @@ std::string full(const std::string& file) {
   return error ? fs::absolute(file).string() : path.string();
 }
 
+std::string out_of_reach(const world::Moved& moved) {
+  std::string folders, path;
+  for (const std::string& folder : moved.out_of_reach) {
+    folders += (folders.empty() ? "" : ", ") + folder;
+    path += (path.empty() ? "" : ":") + folder;
+  }
+  return "there it does not find the files in " + folders +
+         "; save it in the first world's folder, or one beside or in that, or set RUEDO_PATH=" +
+         path + " here and wherever it is opened";
+}
+
 }  // namespace
 
 EditedWorld::EditedWorld(const world::WorldModel& first, std::string file)
@@ -91,7 +102,12 @@ EditedWorld::EditedWorld(const world::WorldModel& first, std::string file)
   } catch (const InputError& error) {
     fault_ = error.what();
   }
-  if (saves()) known_ = bytes_of(file_);
+  if (!saves()) return;
+  known_ = bytes_of(file_);
+  if (!fault_.empty()) return;
+  const auto moved = world::moved_to(source_, first_.file, file_);  // before anything is edited
+  if (!moved.out_of_reach.empty())
+    throw InputError({}, "a world saved as " + file_ + ": " + out_of_reach(moved));
 }
 
 void EditedWorld::begin(std::set<std::string> put) {
@@ -171,8 +187,9 @@ EditedWorld::Saved EditedWorld::save(const world::WorldModel& now,
   }
   try {
     world::WorldText::Written written = text().with(models);
-    written.text = world::moved_to(written.text, fs::path(first_.file).parent_path().string(),
-                                   fs::path(file_).parent_path().string());
+    const world::Moved moved = world::moved_to(written.text, first_.file, file_);
+    written.text = moved.text;
+    if (!moved.out_of_reach.empty()) written.left_out.push_back(out_of_reach(moved));
     world::parse_document(written.text, file);
     if (std::string fault = write_file(file, written.text); !fault.empty())
       return {file + " cannot be written: " + fault, "", ""};

@@ -410,29 +410,41 @@ std::string world_text_of(const WorldModel& world) {
   return made.insert(made.find("  </world>"), models);
 }
 
-std::string moved_to(const std::string& text, const std::string& from_folder,
-                     const std::string& to_folder) {
+namespace {
+
+// Whether an element without children names a file.
+bool names_file(const Element& element, const std::string& parent) {
+  return element.name == "uri" || element.name.ends_with("_map") ||
+         (element.name == "diffuse" && parent == "texture") ||
+         (element.name == "parameters" && parent == "plugin");
+}
+
+}  // namespace
+
+Moved moved_to(const std::string& text, const std::string& from_file, const std::string& to_file) {
   std::error_code error;
-  const fs::path from = fs::weakly_canonical(from_folder, error);
-  const fs::path to = fs::weakly_canonical(to_folder, error);
-  if (from == to) return text;
+  const fs::path from = fs::weakly_canonical(fs::absolute(from_file), error);
+  const fs::path to = fs::weakly_canonical(fs::absolute(to_file), error);
+  if (from.parent_path() == to.parent_path()) return {text, {}};
+  const ResourceFinder here(from, false), there(to, false);
+  Moved moved;
   TextPatch patch;
-  const auto visit = [&](const auto& self, const Element& element,
-                         const TextElement& place) -> void {
+  const auto visit = [&](const auto& self, const Element& element, const TextElement& place,
+                         const std::string& parent) -> void {
     for (size_t i = 0; i < element.children.size(); ++i)
-      self(self, *element.children[i], place.children[i]);
-    if (!element.children.empty() || place.closed()) return;
-    if (element.name != "uri" && element.name != "albedo_map" && element.name != "normal_map")
-      return;
-    const std::string& path = element.text;
-    if (path.empty() || path.find("://") != std::string::npos || fs::path(path).is_absolute() ||
-        !fs::exists(from / path, error))
-      return;
-    patch.replace(place.inside, place.past,
-                  xml_escaped((from / path).lexically_relative(to).string()));
+      self(self, *element.children[i], place.children[i], element.name);
+    if (!element.children.empty() || place.closed() || !names_file(element, parent)) return;
+    auto file = here.find(element.text, from);
+    if (!file && element.name != "uri") file = here.find_texture(element.text, from);
+    if (!file || there.find(element.text, to) == file) return;
+    const std::string path = fs::path(*file).lexically_relative(to.parent_path()).string();
+    patch.replace(place.inside, place.past, xml_escaped(path));
+    if (there.find(path, to) != file)
+      moved.out_of_reach.insert(fs::path(*file).parent_path().string());
   };
-  visit(visit, *parse_document(text, to_folder), places_in(text));
-  return patch.applied_to(text);
+  visit(visit, *parse_document(text, from), places_in(text), "");
+  moved.text = patch.applied_to(text);
+  return moved;
 }
 
 }  // namespace ruedo::world

@@ -66,8 +66,11 @@ std::string world_text_of(const WorldModel& world);
 // A floor and a sun.
 extern const char* const kEmptyWorld;
 
-// The same text for a file in another folder: relative paths are adjusted.
-std::string moved_to(const std::string& text, const std::string& from_folder,
-                     const std::string& to_folder);
+struct Moved {
+  std::string text;
+  std::set<std::string> out_of_reach;  // folders of files that a world there does not find
+};
+// The same text for a file in another folder: what names a file leads to the same one from there.
+Moved moved_to(const std::string& text, const std::string& from_file, const std::string& to_file);
 
 }  // namespace ruedo::world
