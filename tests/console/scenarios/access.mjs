@@ -49,6 +49,13 @@ export default async function access({ page, until, check, ready, fact, picture,
     "a phone's bar is one row",
     await page.evaluate(() => document.getElementById("bar").getBoundingClientRect().height < 60),
   );
+  check(
+    "and names the world",
+    await page.evaluate(() => {
+      const { scrollWidth, clientWidth, textContent } = document.querySelector("#bar .name span");
+      return textContent === "arena" && clientWidth > 0 && scrollWidth <= clientWidth;
+    }),
+  );
   await page.getByRole("button", { name: "more", exact: true }).click();
   check(
     "a phone has all of the bar",
@@ -60,6 +67,8 @@ export default async function access({ page, until, check, ready, fact, picture,
         "top view (3)",
         "dark or light (T)",
         "pause (space)",
+        "one step while paused (.)",
+        "panels and views",
       ].every((name) => {
         const box = [...document.querySelectorAll("#bar button, #bar select")]
           .find((e) => e.title === name || e.ariaLabel === name)

@@ -107,9 +107,37 @@ export default async function events({ page, until, check, seen, ready, given, p
   await until("until it is no more", () => window.ruedo.page.now.playback.now > 2.2);
   await page.setViewportSize({ width: 390, height: 780 });
   await picture("events-phone");
+  const rows = await page.evaluate(() => {
+    const [time, ...buttons] = ["#logtime", "#timeline > button, #timeline > .row > button"]
+      .flatMap((selector) => [...document.querySelectorAll(selector)])
+      .filter((element) => element.checkVisibility())
+      .map((element) => element.getBoundingClientRect());
+    return { time: time.bottom, tops: [...new Set(buttons.map(({ top }) => Math.round(top)))] };
+  });
+  check(
+    "a phone's time line is two rows",
+    rows.tops.length === 1 && rows.time <= rows.tops[0],
+    JSON.stringify(rows),
+  );
+  await page.getByRole("button", { name: "loop, speed and kinds of events" }).click();
+  await picture("events-phone-more");
   check(
     "a phone has all of it",
-    await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth),
+    await page.evaluate(() =>
+      [
+        '[title^="play it again"]',
+        "#event-kind",
+        '#more-time [aria-label="speed"]',
+        "#scrub",
+        "#logtime",
+      ].every((selector) => {
+        const element = document.querySelector(selector),
+          { left, right, bottom } = element.getBoundingClientRect();
+        return (
+          element.checkVisibility() && left >= 0 && right <= innerWidth && bottom <= innerHeight
+        );
+      }),
+    ),
   );
 }
 

@@ -24,7 +24,7 @@ export class Arrangement {
         : makeScenePanel(page, scene.stage, settings),
     );
     new Layout(page, this.dock);
-    makeLayoutMenu(byId("bar"), page, this.dock);
+    makeLayoutMenu(byId("more"), page, this.dock);
     panel.linkButton.addEventListener(
       "click",
       () => void copyLink(model, scene.stage, panel.plots.kept, this.dock.kept),

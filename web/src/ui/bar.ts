@@ -3,6 +3,7 @@ import { clockText } from "../state/clock";
 import { stateWords, type Page, type ViewMode } from "../state/page";
 import { giveFocusBack, h, say } from "../widgets/elements";
 import { icon, iconButton } from "../widgets/icons";
+import { more } from "../widgets/more";
 
 export interface BarActions {
   pauseOrResume(): void;
@@ -65,20 +66,7 @@ export class Bar {
       h("span", { class: "grow" }),
       this.clock,
       this.pause,
-      this.stepButton,
-      this.more(actions),
-      // On a phone: opens the rest
-      h(
-        "button",
-        {
-          id: "open-more",
-          class: "icon",
-          popovertarget: "more",
-          title: "more",
-          "aria-label": "more",
-        },
-        icon("more"),
-      ),
+      ...this.more(actions),
       iconButton("panel", "panel (P)", () => actions.panel()),
     );
     giveFocusBack(place);
@@ -86,7 +74,7 @@ export class Bar {
   }
 
   // Less frequently used controls.
-  private more(actions: BarActions): HTMLElement {
+  private more(actions: BarActions): HTMLElement[] {
     const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
     for (const [mode, key] of [
       ["orbit", "1"],
@@ -101,9 +89,10 @@ export class Bar {
       this.modes.set(mode, button);
       view.append(button);
     }
-    return h(
-      "span",
-      { id: "more", popover: true },
+    return more(
+      "more",
+      "more",
+      this.stepButton,
       this.factor,
       this.rate,
       this.resetButton,

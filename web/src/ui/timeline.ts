@@ -3,6 +3,7 @@ import type { Page } from "../state/page";
 import { loopedTo, shownOf, spanOf, type Shown } from "../state/time";
 import { giveFocusBack, h, say } from "../widgets/elements";
 import { icon, iconButton } from "../widgets/icons";
+import { more } from "../widgets/more";
 import { EventLane } from "./event_lane";
 
 export interface TimelineActions {
@@ -75,9 +76,14 @@ export class Timeline {
       h("span", { class: "row tight" }, back, ahead),
       h("div", { class: "line" }, this.slider, canvas),
       h("div", { class: "times" }, this.time, text),
-      h("span", { class: "row tight" }, before, after, kinds, loop, this.difference()),
-      this.speed,
-      this.branch(),
+      h("span", { class: "row tight" }, before, after),
+      ...more(
+        "more-time",
+        "loop, speed and kinds of events",
+        h("span", { class: "row tight" }, kinds, loop, this.difference()),
+        this.speed,
+        this.branch(),
+      ),
       this.live,
     );
     giveFocusBack(place);
