@@ -435,16 +435,29 @@ RAMP = UPSTAIRS.replace(
 ).replace("4 5 0.2", "9 9 0.2")
 
 
+# A hillside 16 m wide whose height is 3 m * ((x + 8 m) / 16 m)^2, by a picture of a pixel a metre.
+HILL = [round(255 * (i / 16) ** 2) for i in range(17)]
+HEIGHTS = """<geometry><heightmap><uri>hill.pgm</uri><size>16 16 3</size></heightmap></geometry>"""
+TERRAIN = f"""<model name="hill"><static>1</static><link name="l"><collision name="c">{HEIGHTS}
+</collision><visual name="v">{HEIGHTS}</visual></link></model>
+<include><uri>model://p3dx</uri><pose>0 -1 {3 * HILL[8] / 255 + 0.05} 0 0 0</pose></include>"""
+
+
 @pytest.mark.parametrize(
-    ("content", "point"),
-    [(UPSTAIRS, [0.5, 2.5, 2.0]), (RAMP, [2.0, 1.5, 2.0 * math.tan(TILT)])],
-    ids=["upstairs", "ramp"],
+    ("content", "point", "drives"),
+    [
+        (UPSTAIRS, [0.5, 2.5, 2.0], False),
+        (RAMP, [2.0, 1.5, 2.0 * math.tan(TILT)], False),
+        (TERRAIN, [2.0, 1.0, 3 * HILL[10] / 255], True),
+    ],
+    ids=["upstairs", "ramp", "terrain"],
 )
-def test_clicks_meet_what_is_seen(tmp_path, content, point):
+def test_clicks_meet_what_is_seen(tmp_path, content, point, drives):
     world = tmp_path / "world.sdf"
     world.write_text(BARE % content)
+    (tmp_path / "hill.pgm").write_bytes(b"P5 17 17 255\n" + bytes(HILL * 17))
     with running(world=world) as process:
-        browse(process.url, tmp_path, "ground", point)
+        browse(process.url, tmp_path, "ground", {"point": point, "drives": drives})
 
 
 SLAB = """<sdf version="1.9"><world name="slab"><include><uri>model://sun</uri></include>

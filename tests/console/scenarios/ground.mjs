@@ -1,5 +1,7 @@
 // What lies high: clicks, coordinates and ways meet what is seen, not the plane of 0 m.
-export default async function ground({ page, until, check, ready, onScreen, given: [x, y, z] }) {
+// Given: a point that is seen, and whether the robot can drive there.
+export default async function ground({ page, until, check, ready, onScreen, given }) {
+  const [x, y, z] = given.point;
   await page.setViewportSize({ width: 1000, height: 520 });
   await ready();
   await page.locator("#canvas").focus();
@@ -24,8 +26,11 @@ export default async function ground({ page, until, check, ready, onScreen, give
           poses,
         } = window.ruedo,
         body = now.world.bodies.find(({ name }) => name === "box/link")?.index ?? -1;
-      const at = body < 0 ? [] : [...poses.now.subarray(7 * body, 7 * body + 3)];
-      return Math.hypot(at[0] - x, at[1] - y) < 0.05 && Math.abs(at[2] - z - 0.2) < 0.01;
+      if (body < 0) return false;
+      const [px, py, pz, qw, qx, qy, qz] = poses.now.subarray(7 * body, 7 * body + 7),
+        up = [2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)],
+        foot = [px, py, pz].map((v, i) => v - 0.2 * up[i]); // it lies on the slope
+      return Math.hypot(foot[0] - x, foot[1] - y) < 0.1 && Math.abs(foot[2] - z) < 0.03;
     },
     [x, y, z],
   );
@@ -34,7 +39,7 @@ export default async function ground({ page, until, check, ready, onScreen, give
   const point = await page.evaluate(() => window.ruedo.trip.points()[0]);
   check(
     "a robot is sent to what was clicked",
-    Math.hypot(point.x - x, point.y - y + 1) < 0.05 && Math.abs(point.z - z) < 0.02,
+    Math.hypot(point.x - x, point.y - y + 1) < 0.1 && Math.abs(point.z - z) < 0.03,
     JSON.stringify(point),
   );
   check(
@@ -44,5 +49,25 @@ export default async function ground({ page, until, check, ready, onScreen, give
       return Math.abs(position.getZ(0) - z) < 0.05;
     }, z),
     "at another height",
+  );
+  if (!given.drives) return;
+  await page.keyboard.press(" ");
+  await until(
+    "and drives there, over the ground",
+    ([x, y, z]) => {
+      const {
+          page: { now },
+          poses,
+          trip,
+        } = window.ruedo,
+        base = now.scene.bases[0].body,
+        at = poses.now.subarray(7 * base, 7 * base + 3);
+      return (
+        trip.points().length === 0 &&
+        Math.hypot(at[0] - x, at[1] - y) < 0.1 &&
+        Math.abs(at[2] - z) < 0.3
+      );
+    },
+    [x, y - 1, z],
   );
 }
