@@ -8,7 +8,7 @@ import { metrePixels, shareOut } from "../src/scene/detail";
 import { Lights } from "../src/scene/lights";
 import { RobotOverlay } from "../src/scene/overlays";
 import { depthOf, homeOf, shownOf, viewOf } from "../src/scene/viewpoint";
-import { drawable } from "../src/widgets/plots";
+import { drawable, padded, ticksText } from "../src/widgets/plots";
 import type { Description } from "../src/wire/description";
 import type { device_info_t, planar_lidar_t } from "../generated/messages";
 
@@ -100,6 +100,28 @@ describe("rays and cones", () => {
 describe("plots", () => {
   it("leave a gap for what is not finite", () => {
     expect([1, Infinity, -Infinity, NaN, 0].map(drawable)).toEqual([1, null, null, null, 0]);
+    expect(drawable(Number.MAX_VALUE)).toBe(null); // as a sensor's "nothing"
+  });
+
+  it("show a range in which numbers can be told apart", () => {
+    for (const value of [0, 5, -1e-9, 1_799_000_000, 2 ** 60, -1e29]) {
+      const [low, high] = padded(value, value, 0);
+      expect(low).toBeLessThan(value - 1e-7 * Math.abs(value));
+      expect(high).toBeGreaterThan(value + 1e-7 * Math.abs(value));
+    }
+    expect(padded(1e-6, 2e-6, 0)).toEqual([0.9e-6, 2.1e-6].map((v) => expect.closeTo(v, 12)));
+    expect(padded(1e-6, 2e-6, 0.02)[1]).toBeCloseTo(0.02, 3);
+  });
+
+  it("write ticks in few places", () => {
+    expect(ticksText([-0.5, 0, 0.5])).toEqual(["-0.5", "0.0", "0.5"]);
+    expect(ticksText([0, 0.00002])).toEqual(["0", "2e-5"]);
+    expect(ticksText([999_000, 1_000_000, 1_001_000])).toEqual([
+      "9.990e+5",
+      "1.000e+6",
+      "1.001e+6",
+    ]);
+    expect(ticksText([2 ** 60])).toEqual(["1e+18"]);
   });
 });
 

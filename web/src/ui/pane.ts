@@ -6,7 +6,7 @@ import type { Page } from "../state/page";
 import { downloadName } from "../state/world_key";
 import { download } from "../widgets/download";
 import { h } from "../widgets/elements";
-import { drawable, padded } from "../widgets/plots";
+import { drawable, padded, ticksText } from "../widgets/plots";
 import { XYPlot } from "../widgets/xy_plot";
 import type { Series } from "../state/series";
 
@@ -238,10 +238,10 @@ export class Pane {
         legend: { show: false },
         cursor: { points: { size: 6 }, drag: { x: true, y: false, setScale: false } },
         hooks: { setSelect: [(plot) => this.select(plot)] },
-        scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high) } },
+        scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, 0) } },
         axes: [
           { ...axis, size: 32, values: (_, splits) => splits.map((s) => `${s} s`) },
-          { ...axis, size: 54 },
+          { ...axis, size: 54, values: (_, splits) => ticksText(splits) },
         ],
         series: [{}, ...series],
       },

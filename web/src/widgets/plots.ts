@@ -6,6 +6,7 @@ import type { planar_lidar_t, sonar_t, device_info_t } from "../../generated/mes
 import { h } from "./elements";
 
 export const kWindow_s = 30;
+const kLeast = 0.02; // m/s, rad/s or m: what is smaller is noise
 const kLate_s = 0.5; // a longer step back begins anew
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -99,8 +100,8 @@ export class TimePlot {
         legend: { live: false },
         scales: {
           x: { time: false },
-          y: { range: (_, low, high) => padded(low, high) },
-          w: { range: (_, low, high) => padded(low, high) },
+          y: { range: (_, low, high) => padded(low, high, kLeast) },
+          w: { range: (_, low, high) => padded(low, high, kLeast) },
         },
         axes: [
           { ...axis, size: 32, values: (_, splits) => splits.map((s) => `${s} s`) },
@@ -129,16 +130,32 @@ export class TimePlot {
   }
 }
 
-// null, a gap, for what is not finite: one infinite value would hide all others.
+const kMost = 1e30; // that an axis shows
+
+// null, a gap, for what is not finite or as large as the largest double: one such value would hide
+// all others.
 export function drawable(value: number): number | null {
-  return Number.isFinite(value) ? value : null;
+  return Math.abs(value) < kMost ? value : null;
 }
 
-// Some room below and above.
-export function padded(low: number, high: number): [number, number] {
+// Some room below and above: at least that much, and as much as axes tell apart at such numbers.
+export function padded(low: number, high: number, least: number): [number, number] {
   if (!Number.isFinite(low) || !Number.isFinite(high)) return [-0.1, 0.1];
-  const pad = Math.max(0.02, 0.1 * (high - low));
+  const size = Math.max(Math.abs(low), Math.abs(high)),
+    pad =
+      high > low ? Math.max(least, 0.1 * (high - low), 1e-6 * size) : Math.max(0.02, 0.02 * size);
   return [low - pad, high + pad];
+}
+
+// Numbers along an axis, in few places however large or small they are.
+export function ticksText(ticks: number[]): string[] {
+  const size = Math.max(...ticks.map(Math.abs)),
+    step = ticks.length > 1 ? ticks[1]! - ticks[0]! : size || 1;
+  const power = (value: number) => Math.floor(Math.log10(value) + 1e-9);
+  if (size < 1e6 && step >= 1e-4)
+    return ticks.map((tick) => tick.toFixed(Math.max(0, -power(step))));
+  const digits = Math.min(7, Math.max(0, power(size) - power(step)));
+  return ticks.map((tick) => (tick === 0 ? "0" : tick.toExponential(digits)));
 }
 
 // Ranges seen from above, with the robot's heading up.

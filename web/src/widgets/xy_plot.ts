@@ -1,5 +1,6 @@
 // Curves of y over x.
 import { h } from "./elements";
+import { drawable, ticksText } from "./plots";
 
 const kHeight_px = 260,
   kMargin_px = { left: 48, right: 10, top: 18, bottom: 38 };
@@ -38,7 +39,13 @@ export function boxAround(
       high[i] = Math.max(high[i]!, value);
     });
   const half = [0, 1].map((i) =>
-      high[i]! >= low[i]! ? Math.max(0.05, 0.55 * (high[i]! - low[i]!)) : 0.5,
+      high[i]! >= low[i]!
+        ? Math.max(
+            0.05,
+            0.55 * (high[i]! - low[i]!),
+            1e-6 * Math.max(Math.abs(low[i]!), Math.abs(high[i]!)),
+          )
+        : 0.5,
     ),
     centre = [0, 1].map((i) => (high[i]! >= low[i]! ? (high[i]! + low[i]!) / 2 : 0));
   if (equal) {
@@ -81,11 +88,11 @@ export class XYPlot {
     new ResizeObserver(() => this.restyle()).observe(this.canvas);
   }
 
-  // Points that are not finite are left out.
+  // Points that cannot be drawn are left out.
   add(curve: number, time_s: number, x: number, y: number): void {
     const points = this.points[curve]!;
     if (points.length > 0 && time_s <= points.at(-1)![2]) return; // it is here already
-    if (!Number.isFinite(x) || !Number.isFinite(y)) return;
+    if (drawable(x) === null || drawable(y) === null) return;
     points.push([x, y, time_s]);
     const first = points.findIndex(([, , t]) => t >= time_s - this.window_s);
     if (first > 64) points.splice(0, first);
@@ -150,9 +157,12 @@ export class XYPlot {
       draw: (at: number, text: string) => void,
     ) => {
       const step = tickStep(high - low, most),
-        digits = Math.max(0, -Math.floor(Math.log10(step)));
-      for (let n = Math.ceil(low / step); n * step <= high; ++n)
-        draw(n * step, (n * step).toFixed(Math.min(20, digits)));
+        first = Math.ceil(low / step),
+        places = Array.from(
+          { length: Math.floor(high / step) - first + 1 },
+          (_, i) => (first + i) * step,
+        );
+      ticksText(places).forEach((text, i) => draw(places[i]!, text));
     };
     pen.beginPath();
     pen.textAlign = "center";
