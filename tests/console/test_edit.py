@@ -426,7 +426,11 @@ def test_a_world_saved_in_another_folder_opens_the_same(tmp_path, monkeypatch):
 def test_a_library_lists_models_only(tmp_path):
     """Not a folder of meshes that models share, with a model.config that names no model."""
     shutil.copy(ARENA, tmp_path / "w.sdf")
-    for name, sdf in (("shared", ""), ("lost", "<sdf>gone.sdf</sdf>"), ("good", "<sdf>a.sdf</sdf>")):
+    for name, sdf in (
+        ("shared", ""),
+        ("lost", "<sdf>gone.sdf</sdf>"),
+        ("good", "<sdf>a.sdf</sdf>"),
+    ):
         (tmp_path / "models" / name).mkdir(parents=True)
         (tmp_path / "models" / name / "model.config").write_text(f"<model>{sdf}</model>")
     (tmp_path / "models/good/t.stl").write_text(TETRAHEDRON)
