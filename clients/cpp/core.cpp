@@ -118,9 +118,11 @@ void Core::join(Duration timeout) {
   const bool is_waited_for = server_ || regression_;
   if (is_waited_for || in_lockstep()) callbacks_.keep_all();
   if (is_waited_for && !in_lockstep()) {
-    progress_.begin([this](const std::string& line) {
-      server_ ? server_->tell(line) : regression_->tell(line);
-    });
+    progress_.begin(
+        [this](const std::string& line) {
+          server_ ? server_->tell(line) : regression_->tell(line);
+        },
+        info()->epoch, utime());
   }
 }
 

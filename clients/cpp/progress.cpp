@@ -16,6 +16,8 @@ using SteadyClock = std::chrono::steady_clock;
 
 // A program that was given a sample and then does something else for so long is not waited for.
 constexpr std::chrono::milliseconds kPatience(500);
+// Stands for the thread that will first ask for something, which may take as long as it likes.
+const std::thread::id kNotYetKnown;
 
 std::string line_of(int32_t epoch, int64_t received, int64_t used) {
   return std::to_string(epoch) + " " + std::to_string(received) + " " + std::to_string(used) + "\n";
@@ -23,10 +25,14 @@ std::string line_of(int32_t epoch, int64_t received, int64_t used) {
 
 }  // namespace
 
-void Progress::begin(std::function<void(const std::string& line)> tell) {
+void Progress::begin(std::function<void(const std::string& line)> tell, int32_t epoch,
+                     int64_t utime) {
   const std::lock_guard lock(mutex_);
   tell_ = std::move(tell);
+  epoch_ = epoch;
+  uses_[kNotYetKnown] = {utime, SteadyClock::now()};
   told_ = true;
+  say_locked();
 }
 
 bool Progress::in_use() const {
@@ -47,14 +53,21 @@ void Progress::received(int32_t epoch, int64_t utime) {
 void Progress::use(int64_t utime, const Threads& threads) {
   if (!told_) return;
   const std::lock_guard lock(mutex_);
+  uses_.erase(kNotYetKnown);
   for (const std::thread::id thread : threads) uses_[thread] = {utime, SteadyClock::now()};
   say_locked();
 }
 
-void Progress::wait() {
+void Progress::wait() { end_uses({kNotYetKnown, std::this_thread::get_id()}); }
+
+void Progress::listen() { end_uses({kNotYetKnown}); }
+
+void Progress::end_uses(const Threads& threads) {
   if (!told_) return;
   const std::lock_guard lock(mutex_);
-  if (uses_.erase(std::this_thread::get_id()) > 0) say_locked();
+  size_t ended = 0;
+  for (const std::thread::id thread : threads) ended += uses_.erase(thread);
+  if (ended > 0) say_locked();
 }
 
 void Progress::say() {
@@ -65,7 +78,9 @@ void Progress::say() {
 
 void Progress::say_locked() {
   const auto now = SteadyClock::now();
-  std::erase_if(uses_, [&](const auto& one) { return now - one.second.since > kPatience; });
+  std::erase_if(uses_, [&](const auto& one) {
+    return one.first != kNotYetKnown && now - one.second.since > kPatience;
+  });
   int64_t used = std::numeric_limits<int64_t>::max();
   for (const auto& [thread, use] : uses_) {
     const auto since = std::chrono::duration_cast<std::chrono::microseconds>(now - use.since);

@@ -23,8 +23,10 @@ class Progress {
  public:
   using Threads = std::vector<std::thread::id>;
 
-  // tell: writes a line to the server, which may be lost; the next one says all that it did.
-  void begin(std::function<void(const std::string& line)> tell);
+  // The program works with what is known at that sim time until its first use(), wait() or
+  // listen(), however long that takes. tell: writes a line to the server, which may be lost; the
+  // next one says all that it did.
+  void begin(std::function<void(const std::string& line)> tell, int32_t epoch, int64_t utime);
   bool is_told() const { return told_; }
   // It is to be told again soon: a thread works with what it was given.
   bool in_use() const;
@@ -34,6 +36,8 @@ class Progress {
   void use(int64_t utime, const Threads& threads = {std::this_thread::get_id()});
   // The caller's thread waits for what the server sends.
   void wait();
+  // Callbacks get what the server sends.
+  void listen();
   // While a thread works the run goes on as in real time.
   void say();
 
@@ -42,6 +46,7 @@ class Progress {
     int64_t utime;
     std::chrono::steady_clock::time_point since;
   };
+  void end_uses(const Threads& threads);
   void say_locked();
 
   std::atomic<bool> told_{false};

@@ -176,7 +176,7 @@ ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& opti
   }
   std::vector<std::string> command{
       program, "run", options.text.empty() ? world : written(options.text),
-      "--lcm", url_,  "--watch-stdin"};
+      "--lcm", url_,  "--follow-stdin"};
   // It goes with the server, even where this process is killed.
   if (!folder_.empty()) command.insert(command.end(), {"--temporary", folder_});
   add_options(options, command);
@@ -240,7 +240,6 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
     pid_ = -1;
     throw LaunchError(command[0] + " cannot be started: " + std::strerror(error));
   }
-  tell("0 0 9223372036854775807\n");  // the run waits at its beginning until this client joins
 }
 
 std::vector<std::string> ServerProcess::warnings() {

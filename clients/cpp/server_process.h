@@ -1,6 +1,6 @@
 // A private server: on a free port, and ended when this process does, however that ends.
 //
-// The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel
+// The server watches its standard input (--follow-stdin) and ends when the pipe closes: the kernel
 // closes it for a process that was killed, too, and it does not depend on which thread started it,
 // as PR_SET_PDEATHSIG does.
 #pragma once

@@ -74,7 +74,9 @@ Subscription StreamCore::on_sample(std::function<void(const Sample&)> callback) 
   const auto core = connection();
   subscribe(*core);
   core->callbacks().start();
-  return Subscription(callbacks_->add(channel_, std::move(callback)));
+  Subscription subscription(callbacks_->add(channel_, std::move(callback)));
+  core->progress().listen();
+  return subscription;
 }
 
 Subscription StreamCore::on_arrival(std::function<void(const Sample&)> callback) {

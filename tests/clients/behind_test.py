@@ -38,6 +38,17 @@ def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
     assert (0.42 if load else 0.55) < said.numbers("stands")[0] < 0.72
 
 
+@pytest.mark.parametrize("first_call", ["latest", "sleep", "on_sample"])
+def test_the_highest_rate_begins_with_the_launchers_first_call(language, first_call):
+    said = probe(language, "-", "begins_late", first_call)
+    sim_time, real_time = said.numbers("before")
+    assert sim_time < real_time + 0.0501
+    if first_call == "latest":  # the first sample comes up to 20 ms later
+        sim_time, real_time = said.numbers("latest")
+        assert sim_time < real_time + 0.0501 + 0.03 + 0.02
+    assert said.numbers("after")[0] < 98.0 / 2  # s for 98 s of sim time
+
+
 def test_no_primitive_is_lost_on_a_bad_network(language):
     with (
         ruedo_run("--rate", "20", "--disable", "p3at/camera") as server,

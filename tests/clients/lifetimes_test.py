@@ -280,12 +280,25 @@ def test_callbacks_get_the_newest_where_nobody_waits_for_them():
     assert done.returncode == 0 and done.stderr.count("\n") == 1
 
 
+def test_latest_is_never_older_than_what_waits():
+    assert internals("latest") == [
+        "newest 100000",
+        "newest 300000",
+        "next 500000",
+        "at 600000",
+        "newest 600000",
+    ]
+
+
 def test_a_primitive_is_sent_until_a_status_shows_it():
     assert internals("resends") == ["again true"] * 4 + ["shown true"]
 
 
 def test_a_server_is_reported_how_far_its_client_has_come():
     assert internals("progress") == [
+        "began true",
+        "waited for true true",
+        f"listens 0 0 {NEVER}",
         f"first 0 0 {NEVER}",
         f"received 0 25000 {NEVER}",
         "used true",

@@ -1,6 +1,6 @@
 """launch(): a private server on a free port, which ends when its client does, however that ends.
 
-The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel
+The server watches its standard input (--follow-stdin) and ends when the pipe closes: the kernel
 closes it for a client that was killed, too, and it works from any thread of a notebook, as
 PR_SET_PDEATHSIG does not.
 """
@@ -23,7 +23,6 @@ from typing import IO, Any, Literal
 
 from . import arguments
 from .errors import LaunchError, NoServer, for_terminal
-from .session.progress import FIRST
 from .simulation import Simulation
 from .transport.address import has_multicast_route, read_address
 from .transport.stream import is_served
@@ -119,7 +118,7 @@ def launch(
     url, token = _address(url)
     options += _temporary(folder, token)
     server = _Server(
-        [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
+        [program, "run", file, "--lcm", url, "--follow-stdin", *options], token, verbose, folder
     )
     page = f"http://127.0.0.1:{port}/" if port else None
     return _joined(server, url, name, timeout, page)
@@ -360,7 +359,6 @@ class _Server:
             raise LaunchError(f"{command[0]} cannot be started: {error.strerror}") from None
         assert self._process.stdin
         os.set_blocking(self._process.stdin.fileno(), False)
-        self.tell(FIRST)  # the run waits at its beginning until this client joins
 
     def tell(self, line: str) -> None:
         """How far this client has come (progress.py). Where the pipe is full, a later line says it

@@ -225,7 +225,9 @@ class Stream(Reader[T]):
         RuedoError. What a callback raises is raised by the simulation's next call, at the latest by
         close()."""
         self._subscribe()
-        return self._callbacks.add(callback)
+        subscription = self._callbacks.add(callback)
+        self._connection.progress.listen()
+        return subscription
 
     def on_arrival(self, callback: Callable[[T], None]) -> Subscription:
         """The same in the receiving thread, for what is this package's own."""

@@ -204,7 +204,7 @@ int run_world(const RunArguments& arguments) {
   SignalThread signals;
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is reported by write()
   std::optional<LauncherPipe> launcher;
-  if (arguments.watch_stdin) launcher.emplace();
+  if (arguments.watch_stdin || arguments.follow_stdin) launcher.emplace(arguments.follow_stdin);
   const engine::ThreadLimit limit(arguments.threads);
   if (arguments.strict) {
     if (const int code = strict_check(arguments.world); code != kGood) return code;
@@ -385,6 +385,8 @@ void add_run(CLI::App& app, Action& chosen) {
                     "refuse to run if `ruedo check --strict` finds anything");
   command->add_flag("--watch-stdin", arguments->watch_stdin,
                     "end when standard input is closed: for programs that start a server");
+  command->add_flag("--follow-stdin", arguments->follow_stdin,
+                    "the same, and wait for that program, which writes how far it has come");
   command
       ->add_option("--temporary", arguments->temporary,
                    "remove this file or folder, ruedo-*, at the end: for programs that start a "

@@ -31,7 +31,8 @@ struct LauncherPipe::Paced {
   run::Run* run = nullptr;
 };
 
-LauncherPipe::LauncherPipe() : paced_(std::make_shared<Paced>()) {
+LauncherPipe::LauncherPipe(bool waits) : paced_(std::make_shared<Paced>()) {
+  if (waits) paced_->last.emplace();
   std::thread([paced = paced_] {
     char bytes[4096];
     std::string said;

@@ -13,8 +13,9 @@ namespace ruedo::cli {
 
 class LauncherPipe {
  public:
-  // Its thread waits in read() for as long as the process lives.
-  LauncherPipe();
+  // Its thread waits in read() for as long as the process lives. waits: the run waits for the
+  // program from its beginning on, else from the program's first line on.
+  explicit LauncherPipe(bool waits);
 
   // While one lives, the run is not left ahead of the program; with no pipe it does nothing.
   class Pacing {

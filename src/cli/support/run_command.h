@@ -23,7 +23,8 @@ struct RunArguments {
   std::string view;
   bool viewed = false;
   std::vector<std::string> temporary;  // paths
-  bool paused = false, quiet = false, strict = false, watch_stdin = false, sandboxed = false;
+  bool paused = false, quiet = false, strict = false, watch_stdin = false, follow_stdin = false,
+       sandboxed = false;
   int threads = 0;
   Ros2Arguments ros2;
   bool foxglove = false;

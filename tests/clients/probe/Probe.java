@@ -525,6 +525,36 @@ public final class Probe {
         say("age", now - newest - (System.nanoTime() - begin) * 1e-9);
     }
 
+    /** A program that does something else after it has launched a run at the highest rate. */
+    private static void beginsLate(String firstCall) throws InterruptedException {
+        LaunchOptions options =
+                new LaunchOptions()
+                        .rate(Double.POSITIVE_INFINITY)
+                        .noise(false)
+                        .disable("p3at/camera");
+        long begun = System.nanoTime();
+        try (Simulation sim = Ruedo.launch("arena", options)) {
+            Stream<Pose> poses = sim.robot("p3at").pose();
+            double stands;
+            while ((stands = sim.state().time()) < 2.0) Thread.sleep(20);
+            say("before", stands, (System.nanoTime() - begun) * 1e-9);
+            if (firstCall.equals("latest"))
+                say("latest", poses.latest(PATIENCE).time(), (System.nanoTime() - begun) * 1e-9);
+            long called = System.nanoTime();
+            if (firstCall.equals("on_sample")) {
+                CountDownLatch done = new CountDownLatch(1);
+                poses.onSample(
+                        pose -> {
+                            if (pose.time() >= 100.0) done.countDown();
+                        });
+                done.await((long) PATIENCE, TimeUnit.SECONDS);
+            } else {
+                sim.sleep(100.0 - sim.time());
+            }
+            say("after", (System.nanoTime() - called) * 1e-9);
+        }
+    }
+
     /**
      * What a program does in a run that it launched: looks now and then, works in a callback, and
      * acts on what it sees.
@@ -782,6 +812,10 @@ public final class Probe {
         }
         if (command.equals("keeps_up")) {
             keepsUp(a[0]);
+            return;
+        }
+        if (command.equals("begins_late")) {
+            beginsLate(a[0]);
             return;
         }
         if (command.equals("log")) {

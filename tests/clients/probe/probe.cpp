@@ -554,6 +554,36 @@ void keeps_up(const std::string& rate) {
   say("stands", ahead(lrf.next(kPatience)));
 }
 
+// A program that does something else after it has launched a run at the highest rate.
+void begins_late(const std::string& first_call) {
+  const auto begun = std::chrono::steady_clock::now();
+  const auto since = [](const auto& begin) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  rc::LaunchOptions options;
+  options.rate = rc::kFast;
+  options.noise = false;
+  options.disable = {"p3at/camera"};
+  const rc::Simulation sim = rc::launch("arena", options);
+  const auto poses = sim.robot("p3at").pose();
+  double stands = 0.0;
+  while ((stands = sim.state().time()) < 2.0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  say("before", stands, since(begun));
+  if (first_call == "latest") say("latest", poses.latest(kPatience).time(), since(begun));
+  const auto called = std::chrono::steady_clock::now();
+  if (first_call == "on_sample") {
+    std::promise<void> done;
+    const rc::Subscription subscription = poses.on_sample([&](const rc::Pose& pose) {
+      if (pose.time() >= 100.0 && pose.time() < 100.005) done.set_value();
+    });
+    done.get_future().wait_for(std::chrono::duration<double>(kPatience));
+  } else {
+    sim.sleep(100.0 - sim.time());
+  }
+  say("after", since(called));
+}
+
 void many_primitives(const rc::Simulation& sim, const std::string& name, int count) {
   const rc::Robot robot = sim.robot(name);
   int done = 0;
@@ -719,6 +749,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
   if (command == "keeps_up") return keeps_up(a[0]);
+  if (command == "begins_late") return begins_late(a[0]);
   if (command == "log") return read_log(a);
   if (command == "apart") return apart(url, a[0]);
   const bool named =

@@ -460,6 +460,25 @@ def keeps_up(rate):
         say("stands", min(robot.lrf.next(PATIENCE).ranges[60:120]))
 
 
+def begins_late(first_call):
+    """A program that does something else after it has launched a run at the highest rate."""
+    begun = time.monotonic()
+    with ruedo.launch("arena", rate="max", noise=False, disable=["p3at/camera"]) as sim:
+        while (stands := sim.state().time) < 2.0:
+            time.sleep(0.02)
+        say("before", stands, time.monotonic() - begun)
+        if first_call == "latest":
+            say("latest", sim.robot("p3at").pose.latest(PATIENCE).time, time.monotonic() - begun)
+        begun = time.monotonic()
+        if first_call == "on_sample":
+            done = threading.Event()
+            sim.robot("p3at").pose.on_sample(lambda pose: pose.time < 100.0 or done.set())
+            done.wait(PATIENCE)
+        else:
+            sim.sleep(100.0 - sim.time)
+        say("after", time.monotonic() - begun)
+
+
 def many_primitives(sim, name, count):
     robot = sim.robot(name)
     done = 0
@@ -611,8 +630,9 @@ def main():
         if command == "apart":
             apart(url, *rest)
             return
-        if command in ("launch_with", "keeps_up", "log"):
-            {"launch_with": launched_with, "keeps_up": keeps_up, "log": read_log}[command](*rest)
+        launching = {"launch_with": launched_with, "keeps_up": keeps_up, "begins_late": begins_late}
+        if command in launching or command == "log":
+            launching.get(command, read_log)(*rest)
             return
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))

@@ -14,9 +14,11 @@ import ruedo.lcmtypes.world_info_t;
 
 import java.io.IOException;
 import java.nio.ByteBuffer;
+import java.util.ArrayDeque;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
+import java.util.Queue;
 import java.util.concurrent.BlockingQueue;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.LinkedBlockingQueue;
@@ -257,6 +259,43 @@ public final class Internals {
         System.out.println("all " + (heard.size() - 5 + odometry.core.missed() == many));
     }
 
+    /** What waits at the transport is received before latest(), next() and at() give a sample. */
+    private static void latest() {
+        Queue<odometry_t> waiting = new ArrayDeque<>();
+        Server server =
+                new Server() {
+                    @Override
+                    public boolean hasNews() {
+                        Runnable receive =
+                                () -> {
+                                    while (!waiting.isEmpty())
+                                        send("p3at/odometry", waiting.remove());
+                                };
+                        Thread receiving = new Thread(receive);
+                        receiving.start();
+                        Uninterrupted.get(
+                                () -> {
+                                    receiving.join();
+                                    return null;
+                                });
+                        return false;
+                    }
+                };
+        Stream<Odometry> odometry = server.connect().robot("p3at").odometry();
+        odometry.onSample(sample -> {});
+        server.send("p3at/odometry", odometryAt(100_000));
+        System.out.println("newest " + odometry.latest().utime);
+        waiting.add(odometryAt(200_000));
+        waiting.add(odometryAt(300_000));
+        System.out.println("newest " + odometry.latest().utime);
+        waiting.add(odometryAt(400_000));
+        waiting.add(odometryAt(500_000));
+        System.out.println("next " + odometry.next().utime);
+        waiting.add(odometryAt(600_000));
+        System.out.println("at " + odometry.at(600_000, 0.0).utime);
+        System.out.println("newest " + odometry.latest().utime);
+    }
+
     /** A primitive is sent again until a status shows it, or another command has replaced it. */
     private static void resends() throws InterruptedException {
         BlockingQueue<byte[]> sent = new LinkedBlockingQueue<>();
@@ -291,7 +330,14 @@ public final class Internals {
         BlockingQueue<String> lines = new LinkedBlockingQueue<>();
         Progress progress = new Progress();
         progress.use(1); // nobody is told yet
-        progress.begin(lines::add);
+        long joined = System.nanoTime();
+        progress.begin(lines::add, 0, 25_000);
+        System.out.println("began " + usedAfter(lines.take(), 25_000, joined));
+        Thread.sleep(700); // longer than one that has been given something
+        System.out.println(
+                "waited for " + progress.goOn() + " " + usedAfter(lines.take(), 725_000, joined));
+        progress.listens();
+        System.out.print("listens " + lines.take());
         System.out.print("first " + Progress.first());
         progress.received(0, 25_000);
         System.out.print("received " + lines.take());
@@ -493,6 +539,9 @@ public final class Internals {
                 break;
             case "callbacks":
                 callbacks();
+                break;
+            case "latest":
+                latest();
                 break;
             case "resends":
                 resends();

@@ -37,16 +37,22 @@ class Receiving : public testing::Test {
       ++calls;
     });
   }
-  // The lines that the server is told of a simulation.
+  // The lines that the server is told of a simulation, after the first ones.
   std::vector<std::string> lines() {
     const std::lock_guard lock(mutex);
     return told;
   }
   void tell() {
-    server->client.lock()->progress().begin([this](const std::string& line) {
-      const std::lock_guard lock(mutex);
-      told.push_back(line);
-    });
+    Progress& progress = server->client.lock()->progress();
+    progress.begin(
+        [this](const std::string& line) {
+          const std::lock_guard lock(mutex);
+          told.push_back(line);
+        },
+        0, 0);
+    progress.listen();
+    const std::lock_guard lock(mutex);
+    told.clear();
   }
 
   std::shared_ptr<FakeServer> server = std::make_shared<FakeServer>();
@@ -250,7 +256,8 @@ TEST(Progress, ASecondEpochBeginsAnew) {
   std::vector<std::string> lines;
   progress.use(1000);  // nobody is told yet
   EXPECT_FALSE(progress.in_use());
-  progress.begin([&](const std::string& line) { lines.push_back(line); });
+  progress.begin([&](const std::string& line) { lines.push_back(line); }, 0, 0);
+  lines.clear();
   progress.use(1000);
   EXPECT_TRUE(progress.in_use());
   progress.received(1, 0);
@@ -258,6 +265,27 @@ TEST(Progress, ASecondEpochBeginsAnew) {
   EXPECT_FALSE(progress.in_use());
   ASSERT_EQ(lines.size(), 2U);
   EXPECT_EQ(lines[1], "1 0 " + std::to_string(kNever) + "\n");
+}
+
+// Each of the calls that end the beginning.
+TEST(Progress, AProgramIsWaitedForUntilItsFirstCall) {
+  std::vector<std::string> lines;
+  const auto used = [&] { return std::stoll(lines.back().substr(lines.back().rfind(' '))); };
+  using Call = std::function<void(Progress&)>;
+  for (const Call& call : {Call([](Progress& progress) { progress.wait(); }),
+                           Call([](Progress& progress) { progress.listen(); }),
+                           Call([](Progress& progress) { progress.use(7'000'000); })}) {
+    Progress progress;
+    progress.begin([&](const std::string& line) { lines.push_back(line); }, 3, 5'000'000);
+    EXPECT_EQ(lines.back().substr(0, 4), "3 0 ");
+    std::this_thread::sleep_for(700ms);  // longer than one that has been given something
+    progress.received(3, 5'010'000);
+    EXPECT_TRUE(progress.in_use());
+    EXPECT_GE(used(), 5'700'000);
+    EXPECT_LT(used(), 7'000'000);
+    call(progress);
+    EXPECT_GE(used(), 7'000'000);
+  }
 }
 
 TEST(CallbackQueues, WhoBorrowsRunsWhatComesAndWaitsForWhatRuns) {

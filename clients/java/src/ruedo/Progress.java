@@ -1,7 +1,8 @@
 package ruedo;
 
+import java.util.Arrays;
+import java.util.Collections;
 import java.util.HashMap;
-import java.util.Iterator;
 import java.util.List;
 import java.util.Map;
 import java.util.function.Consumer;
@@ -18,6 +19,9 @@ final class Progress {
 
     /** A thread that was given a sample so long ago is not waited for: it does something else. */
     private static final long PATIENCE_NANOS = 500_000_000;
+
+    /** Stands for the thread that will first ask for something, however long that takes. */
+    private static final Thread NOT_YET_KNOWN = null;
 
     private static final long AGAIN_NANOS = 10_000_000;
 
@@ -55,9 +59,15 @@ final class Progress {
         return epoch + " " + received + " " + used + "\n";
     }
 
-    /** teller: writes a line to the server. */
-    void begin(Consumer<String> teller) {
+    /**
+     * The program works with what is known at that sim time until its first use(), waits() or
+     * listens(), however long that takes. teller: writes a line to the server.
+     */
+    synchronized void begin(Consumer<String> teller, int firstEpoch, long utime) {
         tell = teller;
+        epoch = firstEpoch;
+        uses.put(NOT_YET_KNOWN, new Use(utime));
+        say();
     }
 
     boolean isTold() {
@@ -85,6 +95,7 @@ final class Progress {
         if (tell == null) return;
         Use use = new Use(utime);
         synchronized (this) {
+            uses.remove(NOT_YET_KNOWN);
             for (Thread thread : threads) uses.put(thread, use);
             say();
         }
@@ -92,9 +103,18 @@ final class Progress {
 
     /** The caller's thread waits for what the server sends. */
     void waits() {
+        endUses(Arrays.asList(NOT_YET_KNOWN, Thread.currentThread()));
+    }
+
+    /** Callbacks get what the server sends. */
+    void listens() {
+        endUses(Collections.singletonList(NOT_YET_KNOWN));
+    }
+
+    private void endUses(List<Thread> threads) {
         if (tell == null) return;
         synchronized (this) {
-            if (uses.remove(Thread.currentThread()) != null) say();
+            if (uses.keySet().removeAll(threads)) say();
         }
     }
 
@@ -121,11 +141,12 @@ final class Progress {
     private void say() {
         long now = System.nanoTime();
         long used = NEVER;
-        for (Iterator<Use> all = uses.values().iterator(); all.hasNext(); ) {
-            Use use = all.next();
-            if (now - use.since > PATIENCE_NANOS) all.remove();
-            else used = Math.min(used, use.now(now));
-        }
+        uses.entrySet()
+                .removeIf(
+                        use ->
+                                use.getKey() != NOT_YET_KNOWN
+                                        && now - use.getValue().since > PATIENCE_NANOS);
+        for (Use use : uses.values()) used = Math.min(used, use.now(now));
         String line = line(epoch, received, used);
         // Of a server that is stopped the pipe would be full, and hold this thread up. A later line
         // says all that this one does.

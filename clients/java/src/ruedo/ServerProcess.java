@@ -25,7 +25,7 @@ import java.util.concurrent.atomic.AtomicBoolean;
 
 /**
  * A private server: on a free port, and ended when this process is, however that ends. The server
- * watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel closes it
+ * watches its standard input (--follow-stdin) and ends when the pipe closes: the kernel closes it
  * for a process that was killed, too.
  */
 final class ServerProcess {
@@ -56,12 +56,11 @@ final class ServerProcess {
             else url = options.url.equals("auto") ? freeUrl() : options.url;
             String shown = options.text.isEmpty() ? world : written(options.text);
             command =
-                    new ArrayList<>(List.of(program, "run", shown, "--lcm", url, "--watch-stdin"));
+                    new ArrayList<>(List.of(program, "run", shown, "--lcm", url, "--follow-stdin"));
             command.addAll(optionsOf(options));
             addTemporary(folder);
             addTemporary(file);
             process = started(options.verbose);
-            tell(Progress.first()); // the run waits at its beginning until this client joins
             started = true;
         } finally {
             if (!started) cleanUp();

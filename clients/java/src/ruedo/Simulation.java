@@ -114,7 +114,10 @@ public final class Simulation extends Requests implements AutoCloseable {
         }
         if (isWaitedFor || lockstep()) callbacks.keepAll();
         if (isWaitedFor && !lockstep())
-            progress.begin(server != null ? server::tell : regression::tell);
+            progress.begin(
+                    server != null ? server::tell : regression::tell,
+                    info().head.epoch,
+                    clock.utime());
         ids = new AtomicLong(idsFrom(name, info()));
     }
 

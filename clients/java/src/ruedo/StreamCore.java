@@ -100,7 +100,9 @@ final class StreamCore<T extends Sample> {
     }
 
     Subscription onSample(Consumer<? super T> callback) {
-        return add(callbacks, callback, sim.faults);
+        Subscription subscription = add(callbacks, callback, sim.faults);
+        sim.progress.listens();
+        return subscription;
     }
 
     /** In the receiving thread, for what is this package's own. */

@@ -128,7 +128,7 @@ class Connection:
         is_waited_for = self._server or self._regression
         self.callbacks.may_drop = not (is_waited_for or self.in_lockstep)
         if is_waited_for and not self.in_lockstep:
-            self.progress.begin(is_waited_for.tell)
+            self.progress.begin(is_waited_for.tell, self.info.epoch, self.clock.utime)
         self._ids = _ids_from(self.session.name, self.info)
 
     def close(self, during: BaseException | None = None) -> None:

@@ -18,12 +18,12 @@ from collections.abc import Callable
 _NEVER = 2**63 - 1
 # A program that was given a sample and then does something else for so long is not waited for.
 _PATIENCE_SECONDS = 0.5
+# Stands for the thread that will first ask for something, which may take as long as it likes.
+_NOT_YET_KNOWN = 0
 
 Tell = Callable[[str], object]
 
-FIRST = f"0 0 {_NEVER}\n"
-"""The progress line of a program that has received nothing yet."""
-
+_FIRST = f"0 0 {_NEVER}\n"  # nothing was received yet
 _LEFT = "-1 0 0\n"
 _connections = itertools.count()  # of this process, to regressions
 
@@ -34,7 +34,7 @@ class ToRegression:
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._sender = f"{os.getpid()} {next(_connections)}"
-        self.tell(FIRST)
+        self.tell(_FIRST)
 
     def tell(self, line: str) -> None:
         """Writes a line; when the pipe is full, a later line replaces it."""
@@ -70,10 +70,17 @@ class Progress:
         ] = {}  # by thread: since when, us and s of time.monotonic()
         self._told = ""
 
-    def begin(self, tell: Tell) -> None:
-        """tell: writes a line to the server, which may be lost; the next one says all that it
-        did."""
+    def begin(self, tell: Tell, epoch: int, utime: int) -> None:
+        """The program works with what is known at that sim time until its first use(), wait() or
+        listen(), however long that takes.
+
+        tell: writes a line to the server, which may be lost; the next one says all that it did.
+        """
         self._tell = tell
+        with self._lock:
+            self._epoch = epoch
+            self._uses[_NOT_YET_KNOWN] = utime, time.monotonic()
+            self._say()
 
     @property
     def is_told(self) -> bool:
@@ -101,16 +108,25 @@ class Progress:
             return
         since = utime, time.monotonic()
         with self._lock:
+            self._uses.pop(_NOT_YET_KNOWN, None)
             for thread in threads or (threading.get_ident(),):
                 self._uses[thread] = since
             self._say()
 
     def wait(self) -> None:
         """The caller's thread waits for what the server sends."""
+        self._end_uses(_NOT_YET_KNOWN, threading.get_ident())
+
+    def listen(self) -> None:
+        """Callbacks get what the server sends."""
+        self._end_uses(_NOT_YET_KNOWN)
+
+    def _end_uses(self, *threads: int) -> None:
         if self._tell is None:
             return
         with self._lock:
-            if self._uses.pop(threading.get_ident(), None):
+            ended = [self._uses.pop(thread, None) for thread in threads]
+            if any(ended):
                 self._say()
 
     def say(self) -> None:
@@ -123,7 +139,7 @@ class Progress:
         if self._uses:
             now = time.monotonic()
             for thread, (utime, since) in list(self._uses.items()):
-                if now - since > _PATIENCE_SECONDS:
+                if thread != _NOT_YET_KNOWN and now - since > _PATIENCE_SECONDS:
                     del self._uses[thread]
                 else:
                     used = min(used, utime + int((now - since) * 1e6))
