@@ -221,7 +221,11 @@ void LcmBus::read() {
     const int longest = lost    ? static_cast<int>(pause.count())
                         : loss_ ? static_cast<int>(kBetweenLooks.count())
                                 : -1;
-    if (::poll(waiting, 2, longest) < 0) continue;  // a signal
+    if (::poll(waiting, 2, longest) < 0) {
+      if (stopping_) return;
+      if (errno != EINTR) std::this_thread::sleep_for(kFirstPause);  // it may fail again
+      continue;
+    }
     if (loss_) look_for_loss();
     if (waiting[1].revents != 0) {
       if (stopping_) return;

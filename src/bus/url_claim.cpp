@@ -69,7 +69,10 @@ void UrlClaim::describe(std::string owner) {
 void UrlClaim::answer() {
   for (;;) {
     pollfd waiting[2] = {{socket_.get(), POLLIN, 0}, {stop_.get(), POLLIN, 0}};
-    if (::poll(waiting, 2, -1) < 0) continue;
+    if (::poll(waiting, 2, -1) < 0) {
+      if (errno == EINTR) continue;
+      return;  // the socket holds the claim without a word
+    }
     if (waiting[1].revents != 0) return;
     const FileHandle asker(
         ::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));

@@ -6,11 +6,13 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <ctime>
 #include <mutex>
 #include <regex>
 #include <thread>
 
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -160,6 +162,31 @@ TEST(LcmBus, HearsItsChannelsOnly) {
 }
 
 TEST(LcmBus, IsHeardByNobodyOnMemq) { EXPECT_FALSE(LcmBus("memq://").is_heard("p3at/camera")); }
+
+// poll() refuses two files where a process may have one.
+class FewFiles {
+ public:
+  FewFiles() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const rlimit one{1, before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &one);
+  }
+  ~FewFiles() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+// std::clock() counts the processor time of all threads.
+TEST(LcmBus, RestsAndStopsWherePollFails) {
+  LcmBus bus("memq://");
+  const FewFiles few;
+  bus.listen({"a"}, [](const std::string&, const uint8_t*, size_t) {});
+  const std::clock_t begin = std::clock();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  EXPECT_LT(std::clock() - begin, CLOCKS_PER_SEC / 20);
+  bus.stop();
+}
 
 TEST(LcmBus, StopsAtOnce) {
   int count = 0;
