@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -185,3 +186,20 @@ set_tests_properties(late PROPERTIES TIMEOUT 300 TIMEOUT_AFTER_MATCH "1;begun")
         and output[59] == "red <&]]>"
     )
     assert output[60].startswith("--- late failed after ") and output[61:] == ["begun", "---"]
+
+
+def test_tests_that_began_anew_are_counted_in_the_report(tmp_path):
+    (tmp_path / "CTestTestfile.cmake").write_text('add_test(good "true")\n')
+    report, repeats = tmp_path / "tests.xml", tmp_path / "repeats.txt"
+    subprocess.run(
+        ["ctest", "--output-junit", report], cwd=tmp_path, capture_output=True, check=True
+    )
+    repeats.write_text("b_test.py::two\na_test.py::one\nb_test.py::two\n")
+    subprocess.run([sys.executable, ROOT / "scripts/count_repeats.py", report, repeats], check=True)
+    suite = ElementTree.parse(report).getroot()
+    assert [case.get("name") for case in suite.iter("testcase")] == ["good"]
+    assert {one.get("name"): one.get("value") for one in suite.iter("property")} == {
+        "begun anew": "3",
+        "begun anew: a_test.py::one": "1",
+        "begun anew: b_test.py::two": "2",
+    }
