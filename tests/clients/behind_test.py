@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import ruedo
-from conftest import ARENA, PATIENCE, RUEDO, probe, ruedo_run
+from conftest import ARENA, PATIENCE, PROBES, RUEDO, probe, ruedo_run
 from lockstep_test import bad_network
 
 CATCH_UP_SECONDS = 0.25  # Pacer::kMostCatchUp
@@ -97,9 +97,29 @@ def test_who_is_not_waited_for_gets_the_newest(unwaited, caplog):
     assert told.count("reads more slowly") + len(warnings) >= 1
 
 
+WARNS = Path(ARENA).read_text().replace("</static>", "</static><nonsense/>", 1)
+
+
+def test_a_servers_warnings_reach_the_terminal_once(language, tmp_path):
+    """In Python by logging, which prints what nobody handles."""
+    world, errors = tmp_path / "world.sdf", tmp_path / "errors"
+    world.write_text(WARNS)
+    command = [*PROBES[language], "-", "launch", str(world), "--disable", "p3at/camera"]
+    with (
+        errors.open("w") as stderr,
+        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr) as client,
+    ):
+        deadline = time.monotonic() + 60.0
+        while "<nonsense>" not in errors.read_text() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(1.0)  # the server's words are read five times a second
+        client.kill()
+    told = [line for line in errors.read_text().splitlines() if "<nonsense>" in line]
+    assert len(told) == 1 and "the server: " in told[0]
+
+
 def test_a_servers_warnings_reach_the_program_once(caplog):
-    text = Path(ARENA).read_text().replace("<model name", "<model nonsense='1' name", 1)
-    with ruedo.launch(text=text, disable=["p3at/camera"]) as sim:
+    with ruedo.launch(text=WARNS, disable=["p3at/camera"]) as sim:
         robot = sim.robot("p3at")
         for _ in range(3):
             sim._connection.bus.publish("p3at/velocity", b"nonsense")

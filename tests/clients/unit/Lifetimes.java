@@ -112,8 +112,7 @@ public final class Lifetimes {
         List<Runnable> waits =
                 List.of(
                         () -> {
-                            odometry.next(PATIENCE); // the sample that is there
-                            odometry.next(PATIENCE);
+                            while (true) odometry.next(PATIENCE); // those that are there
                         },
                         () -> sim.sleep(1.0),
                         sim::pause,
