@@ -24,6 +24,7 @@ from ruedo.fit.rangefinder import (
     surfaces_of,
 )
 from ruedo.fit.report import distribution, plot_to_svg
+from ruedo.fit.statistics import INCIDENCES, RANGES
 from scipy.stats import ks_2samp
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,8 +36,6 @@ NO_TABLE = (
     "`benchmarks/fit_known_truth.py 30` prints a table of thirty drawn sets of errors; it has not been run for this page. "
     "The tests hold three sets, of three robots (`tests/fit/test_odometry.py`): all errors lie within 3.3 standard deviations of the truth."
 )
-RANGES = ((0, 2), (2, 4), (4, 8), (8, 82))  # m
-INCIDENCES = ((0, 20), (20, 45), (45, 75))  # degrees
 
 
 def main(data, truth):

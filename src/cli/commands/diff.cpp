@@ -1,4 +1,4 @@
-// ruedo diff: compares a log with a golden one, field by field.
+// ruedo diff: compares a log with a golden one, field by field, or two drives by their statistics.
 #include <memory>
 
 #include <fmt/format.h>
@@ -7,6 +7,7 @@
 #include "base/utf8.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
+#include "cli/support/python.h"
 #include "log/diff.h"
 #include "ruedo/errors.h"
 #include "system/output_file.h"
@@ -15,12 +16,21 @@ namespace ruedo::cli {
 namespace {
 
 struct DiffArguments {
-  std::string golden, other, junit, html;
+  std::string golden, other, junit, html, robot;
   std::vector<std::string> tolerances, ignored;
-  bool partial = false;
+  bool partial = false, statistics = false, json = false;
 };
 
+int diff_statistics(const DiffArguments& arguments) {
+  std::vector<std::string> words{"diff", arguments.golden, arguments.other};
+  if (!arguments.html.empty()) words.push_back("--html=" + arguments.html);
+  if (!arguments.robot.empty()) words.push_back("--robot=" + arguments.robot);
+  if (arguments.json) words.emplace_back("--json");
+  return hand_over_to_python("ruedo.fit.cli", "'ruedo[fit]'", words);
+}
+
 int diff(const DiffArguments& arguments) {
+  if (arguments.statistics) return diff_statistics(arguments);
   read_given_types();
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result =
@@ -55,6 +65,17 @@ void add_diff(CLI::App& app, Action& chosen) {
   command->add_option("--html", arguments->html, "write a page with plots of what differs")
       ->type_name("FILE");
   add_types_argument(*command);
+  CLI::Option* statistics =
+      command->add_flag("--statistics", arguments->statistics,
+                        "compare two drives, real or simulated, by their distributions");
+  for (const char* other : {"--tolerance", "--ignore", "--partial", "--junit", "--types"})
+    statistics->excludes(other);
+  command
+      ->add_option("--robot", arguments->robot,
+                   "its model, for the place of its range finder, where a log does not say it")
+      ->type_name("ROBOT")
+      ->needs(statistics);
+  command->add_flag("--json", arguments->json, "print the statistics as JSON")->needs(statistics);
   command->callback([arguments, &chosen] { chosen = [arguments] { return diff(*arguments); }; });
 }
 

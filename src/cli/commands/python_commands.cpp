@@ -1,5 +1,5 @@
-// ruedo campaign, hunt, why, fit and docs: written in Python, in the package `ruedo` of this
-// installation, which this hands over to.
+// ruedo campaign, hunt, why, fit, retrace and docs: written in Python, in the package `ruedo` of
+// this installation, which this hands over to.
 #include "cli/support/commands.h"
 #include "cli/support/python.h"
 
@@ -41,6 +41,9 @@ void add_python_commands(CLI::App& app, Action& chosen) {
        campaigns, extras});
   add(app, chosen,
       {"fit", "fit a robot's errors to logs of the real one", "ruedo.fit.cli", "'ruedo[fit]'"});
+  add(app, chosen,
+      {"retrace", "drive a simulated robot along the path, or by the commands, of a real one",
+       "ruedo.fit.cli", "'ruedo[fit]'"});
   add(app, chosen, {"docs", "open the documentation in a browser", "ruedo.docs", "'ruedo[docs]'"});
 }
 

@@ -1,5 +1,5 @@
-"""ruedo fit, and ruedo import of recorded drives. Exit codes: 0 good, 2 wrong usage, 3 bad file,
-4 environment.
+"""ruedo fit, retrace, import of recorded drives and diff --statistics. Exit codes: 0 good, 2 wrong
+usage, 3 bad file, 4 environment.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path as File
 from typing import Any
 
-from ..errors import NotSupported, RuedoError
+from ..errors import LaunchError, NotSupported, RuedoError
 from ..terminal import drop, flush, say, tell
 from .errors import FitError, UsageError
 
@@ -66,6 +66,8 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--report", metavar="FILE", help="an HTML page with plots")
     one.add_argument("--json", action="store_true", help="print the values as JSON")
     _add_import(commands)
+    _add_retrace(commands)
+    _add_diff(commands)
     return top
 
 
@@ -96,10 +98,52 @@ def _add_import(commands: Any) -> None:
     one.add_argument(
         "--mount",
         type=_mount,
-        default=(0.0, 0.0, 0.0),
         metavar="X,Y,YAW",
-        help="of the range finder on the robot, m and rad (default 0,0,0)",
+        help="of the range finder on the robot, m and rad (default: as the log says, or 0,0,0)",
     )
+
+
+def _add_retrace(commands: Any) -> None:
+    text = "drive a simulated robot along the path, or by the commands, of a real one"
+    one = commands.add_parser("retrace", help=text, description=text + " (docs/fit.md)")
+    one.set_defaults(action=_retrace)
+    one.add_argument("LOG", help="a drive, of any kind that Ruedo reads")
+    one.add_argument(
+        "--world", required=True, metavar="WORLD", help="a file, such as ruedo import makes"
+    )
+    one.add_argument(
+        "--robot", required=True, metavar="ROBOT", help="its model, such as ruedo fit makes"
+    )
+    one.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help="the log of the simulated drive"
+    )
+    one.add_argument(
+        "--commands",
+        action="store_true",
+        help="give the robot the log's velocity commands (default: put it on the log's path)",
+    )
+    one.add_argument(
+        "--delay",
+        type=_number(0, 10),
+        default=0.0,
+        metavar="S",
+        help="with --commands: seconds until a command acts (default 0)",
+    )
+    one.add_argument("--seed", type=int, default=1, help="of the simulated errors (default 1)")
+    one.add_argument(
+        "--of", metavar="NAME", default="", help="of an LCM log with several robots: which"
+    )
+
+
+def _add_diff(commands: Any) -> None:
+    """What ruedo diff --statistics hands over."""
+    text = "compare two drives by their distributions"
+    one = commands.add_parser("diff", help=text, description=text + " (docs/fit.md)")
+    one.set_defaults(action=_diff)
+    one.add_argument("LOG", nargs=2, help="drives, of any kind that Ruedo reads")
+    one.add_argument("--robot", metavar="ROBOT")
+    one.add_argument("--html", metavar="FILE")
+    one.add_argument("--json", action="store_true")
 
 
 def _number(low: float, high: float) -> Callable[[str], float]:
@@ -130,17 +174,70 @@ def _mount(text: str) -> tuple[float, ...]:
 
 
 def _import(arguments: argparse.Namespace) -> int:
+    from .mapping import own_mount
     from .read import read
     from .worlds import make_world
 
     recording = read(arguments.LOG, arguments.of)
-    made = make_world(
-        recording, File(arguments.out), arguments.mount, arguments.resolution, arguments.height
-    )
+    mount = tuple(own_mount(recording)) if arguments.mount is None else arguments.mount
+    made = make_world(recording, File(arguments.out), mount, arguments.resolution, arguments.height)
     for finding in recording.findings + [one.text() for one in made.moving]:
         tell(f"{recording.file}: {finding}")
     say(made.summary)
     return GOOD
+
+
+def _retrace(arguments: argparse.Namespace) -> int:
+    from .fitting import read_robot
+    from .read import read
+    from .retrace import retrace
+
+    _check_folder(arguments.output)
+    if arguments.delay and not arguments.commands:
+        raise UsageError("--delay is for --commands: a path has no delay")
+    recording = read(arguments.LOG, arguments.of)
+    robot = read_robot(arguments.robot)
+    for finding in recording.findings:
+        tell(f"{recording.file}: {finding}")
+    try:
+        done = retrace(
+            recording, arguments.world, robot, File(arguments.output),
+            by_commands=arguments.commands, delay=arguments.delay, seed=arguments.seed,
+        )  # fmt: skip
+    except LaunchError as error:
+        raise FitError(str(error).split("\n(`")[0]) from None
+    if done.jumps:
+        tell(f"{recording.file}: the path jumps in {done.jumps} places, over which nothing drives")
+    what = "by its commands" if arguments.commands else "on its path"
+    say(
+        f"{arguments.output}: {done.seconds:.1f} s of {robot.name} {what}; "
+        f"its time 0 is {done.begin:.6g} s of {recording.file.name}"
+    )
+    return GOOD
+
+
+def _diff(arguments: argparse.Namespace) -> int:
+    from .fitting import read_robot
+    from .read import read
+    from .statistics import compare
+
+    _check_folder(arguments.html)
+    robot = read_robot(arguments.robot) if arguments.robot else None
+    first, second = (read(one) for one in arguments.LOG)
+    found = compare(first, second, robot)
+    for remark in found.remarks:
+        tell(f"ruedo: {remark}")
+    if arguments.html:
+        from .report import write_comparison
+
+        write_comparison(found, File(arguments.html))
+    say(json.dumps(found.as_dict()) if arguments.json else found.text())
+    return GOOD
+
+
+def _check_folder(file: str | None) -> None:
+    if file and not File(file).absolute().parent.is_dir():
+        raise UsageError(f"{file}: its folder does not exist")
 
 
 def _fit(arguments: argparse.Namespace) -> int:
@@ -149,10 +246,8 @@ def _fit(arguments: argparse.Namespace) -> int:
 
     if arguments.output and not arguments.robot:
         raise UsageError("-o needs --robot: the model into which the values are written")
-    for option in ("output", "report"):
-        named = getattr(arguments, option)
-        if named and not File(named).absolute().parent.is_dir():
-            raise UsageError(f"{named}: its folder does not exist")
+    _check_folder(arguments.output)
+    _check_folder(arguments.report)
     robot = read_robot(arguments.robot) if arguments.robot else None
     recordings = [read(one, arguments.of) for one in arguments.LOG]
     answer = fit(recordings, robot, arguments.mount)

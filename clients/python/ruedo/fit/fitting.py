@@ -17,6 +17,7 @@ from ..launch import find_ruedo
 from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal
+from .mapping import own_mount
 from .motion import fit_motion
 from .odometry import OdometryFit, fit_odometry
 from .rangefinder import BeamModel, fit_rangefinder
@@ -127,6 +128,7 @@ def fit(
         _fit_scans(answer, robot, mount)
     if motion := fit_motion(recordings[0]):
         answer.parts["Motion"] = motion
+        _motion_settings(answer, motion)
     if timing := fit_timing(recordings):
         answer.parts["Timing"] = timing
     if recordings[0].imu is not None:
@@ -161,12 +163,8 @@ def _fit_drive(answer: Fit, robot: Robot | None) -> None:
 def _fit_scans(answer: Fit, robot: Robot | None, mount: Sequence[float] | None) -> None:
     recording = next(one for one in answer.recordings if one.scans is not None)
     assert recording.scans is not None
-    device = None if robot is None else _rangefinder(robot, recording.scans.ranges.shape[1])
-    place = np.zeros(3) if mount is None else np.asarray(mount, float)
-    if mount is None and device is not None and recording.scans.pose is None:
-        w, x, y, z = device["orientation"]
-        heading = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        place = np.array([*device["position"][:2], heading])
+    device = None if robot is None else rangefinder_of(robot, recording.scans.ranges.shape[1])
+    place = mount_on(recording, robot) if mount is None else np.asarray(mount, float)
     try:
         model, estimates = fit_rangefinder([recording], place)
     except FitError as error:
@@ -199,11 +197,30 @@ def _fit_scans(answer: Fit, robot: Robot | None, mount: Sequence[float] | None) 
             answer.settings.append(Setting(path, value, source + interval))
 
 
-def _rangefinder(robot: Robot, rays: int) -> dict[str, Any] | None:
+def rangefinder_of(robot: Robot, rays: int) -> dict[str, Any] | None:
     """The robot's planar range finder with so many rays, or its only one."""
     every = [one for one in robot.devices if one["kind"] == "lrf"]
     fitting = [one for one in every if one["width"] == rays]
     return fitting[0] if fitting else every[0] if len(every) == 1 else None
+
+
+def mount_on(recording: Recording, robot: Robot | None) -> Array:
+    """x, y (m) and heading (rad) of the range finder: zeros where the log has its own poses, else
+    as the model says, or the log.
+    """
+    scans = recording.scans
+    if robot is not None and scans is not None and scans.pose is None:
+        device = rangefinder_of(robot, scans.ranges.shape[1])
+        if device is not None:
+            return mount_of(device)
+    return own_mount(recording)
+
+
+def mount_of(device: dict[str, Any]) -> Array:
+    """x, y (m) and heading (rad) of a device on its robot."""
+    w, x, y, z = device["orientation"]
+    heading = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.array([*device["position"][:2], heading])
 
 
 def believed_measures(recording: Recording, geometry: Geometry) -> Array:
@@ -222,6 +239,20 @@ def believed_measures(recording: Recording, geometry: Geometry) -> Array:
     turn, *_ = np.linalg.lstsq(turned * [-ahead[0], ahead[1]], steps[:, 2:], rcond=None)
     track = 1 / float(turn.mean()) if turn.mean() > 0 else nominal[2]
     return np.array([*ahead, track])
+
+
+def _motion_settings(answer: Fit, motion: list[Estimate]) -> None:
+    source = f"fitted to {answer.recordings[0].file.name}, 95 %: "
+    elements = {
+        "speed: acceleration": "acceleration",
+        "speed: deceleration": "deceleration",
+        "turn rate: acceleration": "turn_acceleration",
+    }
+    for one in motion:
+        if one.value is not None and one.name in elements:
+            path = f"ruedo:drive/ruedo:{elements[one.name]}"
+            interval = f"{one.low:.5g} to {one.high:.5g}"
+            answer.settings.append(Setting(path, f"{one.value:.5g}", source + interval))
 
 
 def _drive_settings(answer: Fit, found: OdometryFit, robot: Robot) -> None:

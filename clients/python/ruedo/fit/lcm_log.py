@@ -149,7 +149,15 @@ def _sides(angles: Array, turns: Array) -> Array | None:
 
 
 def _use_info(recording: Recording, info: Any, name: str) -> None:
-    """The measures of the drive."""
+    """The measures of the drive, and where the range finder is."""
     robot = next((one for one in info.robots if one.name == name), None)
     if robot is not None and recording.wheels is not None:
         recording.geometry = Geometry("differential", robot.wheel_radius, robot.track)
+    scans = recording.scans
+    if scans is None:
+        return
+    for one in info.devices:
+        if (one.robot, one.kind, one.width) == (name, "lrf", scans.ranges.shape[1]):
+            heading = float(yaw_of(np.array([one.orientation]))[0])
+            scans.mount = np.array([*one.position[:2], heading])
+            break

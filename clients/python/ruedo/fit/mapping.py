@@ -54,6 +54,13 @@ class Occupancy:
     moving: list[Moving]
 
 
+def own_mount(recording: Recording) -> Array:
+    """(3,) x, y (m), heading (rad) of the range finder on the robot, as far as the log says it."""
+    scans = recording.scans
+    known = scans is not None and scans.pose is None and scans.mount is not None
+    return scans.mount if known else np.zeros(3)  # type: ignore[union-attr, return-value]
+
+
 def scan_poses(recording: Recording, mount: Array) -> Array:
     """(N, 3) poses of the range finder in the world. mount: x, y, heading on the robot. Raises
     FitError.

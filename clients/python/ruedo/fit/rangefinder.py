@@ -29,6 +29,7 @@ STEEPEST = np.radians(75)  # of incidence, beyond which a reading tells little
 OUTLIER_M = 0.3  # half width of what residuals are modelled in
 _MOST_POINTS = 300_000
 _MOST_READINGS = 40_000
+_AT_ONCE = 4_000  # readings, each with hundreds of points around it
 _RANGE_EDGES = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _LEAST_READINGS = 500
 
@@ -110,37 +111,50 @@ def residuals_of(
     way = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     reach = data.ranges[scan, ray]
     ends = poses[scan, :2] + reach[:, None] * way
-    parts = []
-    near = surfaces.tree.query_ball_point(ends, WINDOW_M)
-    for i, found in enumerate(near):
-        around = np.array(found, np.int64)
-        around = around[surfaces.scan[around] != scan[i]]
-        if len(around) >= LEAST_POINTS:
-            one = _against_line(surfaces.points[around], ends[i], way[i])
-            if one is not None:
-                parts.append((one[0], reach[i], one[1]))
-    if not parts:
+    parts = [
+        _against_lines(surfaces, ends[part], way[part], scan[part])
+        for part in np.array_split(np.arange(len(ends)), max(1, len(ends) // _AT_ONCE))
+    ]
+    residual, incidence = np.concatenate(parts, axis=1)
+    known = np.isfinite(residual)
+    if not known.any():
         raise FitError(f"{recording.file}: no reading lies on a surface that other scans saw")
-    residual, kept, incidence = np.array(parts).T
-    return Residuals(residual, kept, incidence, len(parts) / len(row))
+    return Residuals(residual[known], reach[known], incidence[known], float(known.mean()))
 
 
-def _against_line(points: Array, end: Array, way: Array) -> tuple[float, float] | None:
-    """Residual (m, scaled to the variance of a reading) and incidence (rad) of a reading."""
-    middle = points.mean(axis=0)
-    apart = points - middle
-    (small, large), axes = np.linalg.eigh(apart.T @ apart)
-    count = len(points)
-    if small / count > FLAT_M**2 or large < 9 * small or large / count < (WINDOW_M / 4) ** 2:
-        return None
-    normal_, along = axes[:, 0], axes[:, 1]
-    facing = float(way @ normal_)
-    incidence = np.arccos(min(1.0, abs(facing)))
-    if incidence > STEEPEST:
-        return None
-    residual = float((end - middle) @ normal_) / facing
-    leverage = 1 / count + float((end - middle) @ along) ** 2 / large
-    return residual / np.sqrt(1 + leverage), float(incidence)
+def _against_lines(
+    surfaces: Surfaces, ends: Array, way: Array, scan: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(2, N): residual (m, scaled to the variance of a reading) and incidence (rad) of readings
+    against the lines through the points of other scans around them; NaN without a line.
+    """
+    near = surfaces.tree.query_ball_point(ends, WINDOW_M)
+    row = np.repeat(np.arange(len(ends)), [len(one) for one in near])
+    point = np.concatenate([np.asarray(one, np.int64) for one in near])
+    others = surfaces.scan[point] != scan[row]
+    row, point = row[others], point[others]
+    x, y = (surfaces.points[point] - ends[row]).T
+
+    def total(values: Array) -> Array:
+        return np.asarray(np.bincount(row, values, len(ends)), float)
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        count = np.bincount(row, minlength=len(ends))
+        middle_x, middle_y = total(x) / count, total(y) / count
+        xx = total(x * x) - count * middle_x**2
+        yy = total(y * y) - count * middle_y**2
+        xy = total(x * y) - count * middle_x * middle_y
+        apart = np.hypot((xx - yy) / 2, xy)
+        small, large = np.maximum((xx + yy) / 2 - apart, 0), (xx + yy) / 2 + apart
+        angle = np.arctan2(2 * xy, xx - yy) / 2  # of the line
+        sine, cosine = np.sin(angle), np.cos(angle)
+        facing = cosine * way[:, 1] - sine * way[:, 0]
+        incidence = np.arccos(np.minimum(1.0, np.abs(facing)))
+        leverage = 1 / count + (middle_x * cosine + middle_y * sine) ** 2 / large
+        residual = (middle_x * sine - middle_y * cosine) / facing / np.sqrt(1 + leverage)
+        good = (count >= LEAST_POINTS) & (small / count <= FLAT_M**2) & (large >= 9 * small)
+        good &= (large / count >= (WINDOW_M / 4) ** 2) & (incidence <= STEEPEST)
+    return np.where(good, [residual, incidence], np.nan)
 
 
 def fit_beams(found: Residuals) -> tuple[BeamModel, Array]:

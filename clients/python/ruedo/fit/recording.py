@@ -61,6 +61,7 @@ class Scans:
     max_range: float  # m, from which on a reading means "no return"
     pose: Array | None = None
     source: str = ""  # of the poses
+    mount: Array | None = None  # (3,) x, y (m), heading (rad) on the robot, where the log says it
 
     @property
     def angles(self) -> Array:
@@ -139,3 +140,8 @@ def body_steps(pose: Array) -> Array:
     ahead = np.cos(along) * step[:, 0] + np.sin(along) * step[:, 1]
     left = -np.sin(along) * step[:, 0] + np.cos(along) * step[:, 1]
     return np.stack([ahead * stretch, left * stretch, step[:, 2]], axis=1)
+
+
+def wrapped(angle: Array) -> Array:
+    """Into [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,4 +1,4 @@
-"""A fit as one HTML page that needs nothing but a browser: values with intervals, and plots."""
+"""A fit, or a comparison of two drives, as one HTML page that needs nothing but a browser."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from .drives import integrate
 from .errors import FitError
 from .fitting import Fit
 from .odometry import OdometryFit
+from .statistics import Row, Spectrum, Statistics
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1d2330; max-width: 1000px; margin: 2em auto; padding: 0 1em }
 h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #d6dae3 }
 table { border-collapse: collapse } th, td { text-align: left; padding: .2em 1em .2em 0 }
+pre { overflow-x: auto; font-size: 12px } figure { display: inline-block; margin: 0 1em 1em 0; max-width: 480px }
 td.n { text-align: right; font-variant-numeric: tabular-nums } svg { max-width: 100%; height: auto }
 """
 
@@ -37,8 +39,52 @@ def write_report(answer: Fit, file: File) -> None:
         )
     if answer.odometry is not None:
         parts += _drive_plots(answer, answer.odometry)
+    _write_page(file, names, parts)
+
+
+def write_comparison(found: Statistics, file: File) -> None:
+    """Needs Matplotlib. Raises FitError without it, OSError for a full disk."""
+    first, second = (html.escape(File(one).name) for one in found.files)
+    parts = [f"<h1>{first} (A) and {second} (B)</h1>"]
+    if found.remarks:
+        parts.append(
+            "<ul>" + "".join(f"<li>{html.escape(one)}</li>" for one in found.remarks) + "</ul>"
+        )
+    parts.append(f"<pre>{html.escape(found.text())}</pre>")
+    groups: dict[str, list[Row]] = {}
+    for row in found.rows:
+        groups.setdefault(f"{row.part}: {row.group}", []).append(row)
+    plots: list[tuple[str, Any]] = [
+        (title, lambda axes, rows=rows: _draw_rows(axes, rows)) for title, rows in groups.items()
+    ]
+    plots += [(one.name, lambda axes, one=one: _draw_spectrum(axes, one)) for one in found.spectra]
+    for title, draw in plots:
+        parts.append(
+            f"<figure>{plot_to_svg(draw, 5, 3)}<figcaption>{html.escape(title)}</figcaption></figure>"
+        )
+    _write_page(file, f"{first} and {second}", parts)
+
+
+def _draw_rows(axes: Any, rows: list[Row]) -> None:
+    for k, row in enumerate(rows):
+        for label, values, style in zip("AB", row.values, ("-", "--")):
+            axes.plot(*distribution(values), style, color=f"C{k}", label=f"{row.name}, {label}")
+    every = np.concatenate([values for row in rows for values in row.values])
+    low, high = np.quantile(every, [0.002, 0.998])
+    axes.set(xlabel=rows[0].unit, ylabel="share below", xlim=(low, high + 1e-12))
+    axes.legend(fontsize=7)
+
+
+def _draw_spectrum(axes: Any, one: Spectrum) -> None:
+    for label, hertz, power, style in zip("AB", one.hertz, one.power, ("-", "--")):
+        axes.loglog(hertz[1:], np.sqrt(power[1:]), style, label=label)
+    axes.set(xlabel="frequency / Hz", ylabel=f"{one.unit} per root Hz")
+    axes.legend()
+
+
+def _write_page(file: File, title: str, parts: list[str]) -> None:
     file.write_text(
-        f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{html.escape(names)}</title>"
+        f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{html.escape(title)}</title>"
         f"<style>{_STYLE}</style></head><body>{''.join(parts)}</body></html>\n",
         encoding="utf-8",
     )
