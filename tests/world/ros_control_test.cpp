@@ -590,7 +590,7 @@ TEST(ControllerFiles, AreReadOnceAndAreBounded) {
       files.read(last);
       FAIL();
     } catch (const InputError& error) {
-      EXPECT_EQ(error.message(), "the controllers' files of a world hold no more than 4 MiB");
+      EXPECT_EQ(error.message(), "the controller files of a world hold more than 4 MiB");
     }
   }
 

@@ -1,4 +1,4 @@
-"""What Ruedo's wheel brings along for LCM's: a bare Debian has no GLib, which LCM's compiled part
+"""Libraries that Ruedo's wheel adds for LCM's: a bare Debian has no GLib, which LCM's compiled part
 is linked to.
 """
 

@@ -228,7 +228,7 @@ def array(what: str, value: Any) -> NDArray[np.float64]:
 
 
 def numbers(what: str, values: Any, count: int) -> list[float]:
-    """So many of them. Raises TypeError and ValueError."""
+    """A list of `count` numbers. Raises TypeError and ValueError."""
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
         raise TypeError(f"{what} is {count} numbers, not {shown(values)}")
     given = [number(what, one) for one in values]

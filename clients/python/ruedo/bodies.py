@@ -52,13 +52,13 @@ class Body:
 
     @property
     def pose(self) -> Transform:
-        """In the world."""
+        """The pose in the world."""
         state = self._there.state(self.name)
         return Transform(state.position, state.orientation)
 
     @property
     def twist(self) -> Twist:
-        """In the world."""
+        """The twist in the world."""
         state = self._there.state(self.name)
         return Twist(state.linear, state.angular)
 

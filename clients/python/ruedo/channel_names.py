@@ -12,9 +12,8 @@ _CHANGE_BYTES = 200  # of one without its name
 
 
 class ChannelNames:
-    """As they are in each of the states that a client in lockstep collects, one after the other. Of
-    more than 16 MB of changes since the last one, the oldest count as made: a server may send ever
-    new ones.
+    """The channels' names in each state that a client in lockstep collects, in order. Of more than
+    16 MB of changes since the last one, the oldest count as made: a server may send ever new ones.
     """
 
     def __init__(self) -> None:
@@ -50,8 +49,8 @@ class ChannelNames:
             self._make_first()
 
     def of(self, channel: int) -> str:
-        """In that state. Where the info from before it was lost, the next name of the channel; ""
-        without one.
+        """The channel's name in that state. If the info from before it was lost, the channel's next
+        name; "" without one.
         """
         if channel < len(self._names) and self._names[channel]:
             return self._names[channel]

@@ -66,9 +66,9 @@ class Saved:
 
 
 class SavedWorld(Saved):
-    """A copy of an :class:`Engine`'s world as it was; it does not change.
+    """The saved state of a world of an :class:`Engine`; it does not change.
 
-    world: the copy that it was. seed: that it had. steps: the number of the state. time: s.
+    world: its index in the engine. seed: its seed. steps: the steps since its reset. time: s.
     """
 
     __slots__ = ("_saved_core", "seed", "steps", "time", "world")

@@ -52,7 +52,7 @@ class UnknownField(UnknownName, ValueError):
 
 
 class Timeout(RuedoError, TimeoutError):
-    """Nothing came within the time given."""
+    """No message or reply came within the timeout."""
 
 
 class TypeMismatch(RuedoError):

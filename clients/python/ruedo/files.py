@@ -48,7 +48,7 @@ def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:
 
 
 def sha256_of(path: str | os.PathLike[str]) -> str:
-    """As `sha256sum` prints it. Raises OSError."""
+    """The hash of the file as `sha256sum` prints it. Raises OSError."""
     digest = hashlib.sha256()
     with open_regular(path) as file:
         while piece := file.read(1 << 20):
@@ -94,7 +94,7 @@ def _with_exponents(of: Any) -> Any:
 
 
 def _values(node: Any, known: dict[int, int]) -> int:
-    """Of a node and all below it; each is counted once, and multiplied by its aliases."""
+    """The number of values of a node and all below it, each counted once per alias."""
     import yaml
 
     if id(node) not in known:

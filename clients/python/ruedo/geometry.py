@@ -86,7 +86,7 @@ class Transform:
 
     @classmethod
     def of(cls, x: float, y: float, heading: float = 0.0, z: float = 0.0) -> Transform:
-        """In m and rad, counter-clockwise from the x axis."""
+        """A transform from m and rad, counter-clockwise from the x axis."""
         return cls((x, y, z), (np.cos(heading / 2.0), 0.0, 0.0, np.sin(heading / 2.0)))
 
     @property

@@ -434,7 +434,7 @@ class _Server:
             self._output = None
 
     def forked(self) -> None:
-        """In a fork's child: the pipe is not to keep the server alive."""
+        """For a fork's child: closes its end of the pipe, lest that keeps the server alive."""
         if self._process.stdin:
             self._process.stdin.close()
 

@@ -103,7 +103,7 @@ class Observations(State):
 
     @property
     def messages(self) -> list[Message]:
-        """Those of its steps, in the order in which the simulation made them."""
+        """The messages of these steps, in the order in which the simulation made them."""
         made: list[Message] | None = self.__dict__.get("_messages")
         if made is None:
             made = [Message(step, *one) for step, came in self._steps for one in came]
@@ -353,7 +353,7 @@ class Stepper:
         self._last = (state.utime, state.step, state.state_hash)
 
     def _subscribe_all(self) -> None:
-        """To everything that the simulation publishes: a manifest may name any of it."""
+        """Subscribes to everything that the simulation publishes: a manifest may list any of it."""
         info = self._connection.info
         if self._info is info:
             return
@@ -672,7 +672,7 @@ class Stepper:
             step = self._steps.get(self._have + 1)
 
     def on_reply(self, reply: Any) -> None:
-        """To GRANT or RESEND."""
+        """Handles a reply to GRANT or RESEND."""
         if not self._part:
             return
         granting = reply.kind == lcmtypes.request_t.GRANT

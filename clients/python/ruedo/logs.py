@@ -286,7 +286,7 @@ class _Rows:
             self.fields.setdefault(name, []).append(value)
 
     def columns(self) -> dict[str, Any]:
-        """As read_columns() has them."""
+        """The columns as read_columns() returns them."""
         if self.convert:
             return {name: _stacked(cells) for name, cells in self.fields.items()}
         kinds = zip(self.type.__typenames__, self.type.__dimensions__)
@@ -402,7 +402,7 @@ def _frame(pandas: Any, columns: dict[str, Any]) -> Any:
 
 
 def _cells(column: Any) -> Any:
-    """As a DataFrame has them: the bytes of pictures and maps as bytes."""
+    """The column's cells for a DataFrame: the bytes of pictures and maps as bytes."""
     if column.ndim == 1 and column.dtype != object:
         return column
     first = column[0] if len(column) else None

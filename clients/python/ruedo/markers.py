@@ -1,4 +1,4 @@
-"""What a program draws in the world for people to see, in the web console and in logs: the markers
+"""Drawings of a program in the world, which the web console and logs show: the markers
 that Simulation.markers() takes.
 
 Points are rows of x, y, z in m, or of x, y on the floor; a color is red, green, blue and maybe
@@ -30,7 +30,7 @@ def lines(points: ArrayLike, color: Color = _BLUE, width: float = 0.03) -> lcmty
 
 
 def path(points: ArrayLike, color: Color = _BLUE, width: float = 0.03) -> lcmtypes.marker_t:
-    """One line from point to point."""
+    """A line from point to point."""
     marker = _made(lcmtypes.marker_t.PATH, color, width)
     _set_points(marker, points)
     return marker

@@ -99,7 +99,7 @@ class Motion:
         return self
 
     def _await_end(self, deadline: float | None, timeout: float | None) -> None:
-        """With the lock held."""
+        """Waits for the motion's end, with the lock held."""
         if not self.done:
             self._connection.progress.wait()
         standstill = self._connection.standstill(f"{self._robot}: wait() for {self.kind}")
@@ -241,7 +241,7 @@ class Driver:
         return motion
 
     def end(self, reason: str) -> None:
-        """Its robot, or its run, is gone: nothing is repeated to the next one of that name."""
+        """Stops when the robot or the run is gone: the next robot of that name gets no commands."""
         with self._lock:
             self._ended, self._held = reason, None
             motions, self._motions = self._motions, []
@@ -335,7 +335,7 @@ class Drivers:
             driver.repeat()
 
     def repeat_at(self, utime: int) -> None:
-        """In the time of a simulation that runs faster than real time."""
+        """Repeats commands by sim time, for a simulation that runs faster than real time."""
         for driver in tuple(self.repeating):
             driver.repeat_at(utime)
 

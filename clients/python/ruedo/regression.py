@@ -95,7 +95,7 @@ def _held(name: str, value: object) -> str:
 
 
 def _countable(what: str, value: Any, kind: str = "number") -> Any:
-    """No truth value, which Python takes for 0 or 1."""
+    """The value; refuses a bool, which Python takes for 0 or 1."""
     if isinstance(value, (bool, np.bool_)):
         raise TypeError(f"{what} is a {kind}, not {value}")
     return value
@@ -117,7 +117,7 @@ def _distance(what: str, value: Any) -> float | None:
 
 
 def _line(what: str, words: Sequence[_PathLike] | str | None) -> str | None:
-    """For a shell."""
+    """The command line for a shell."""
     if words is None:
         return None
     if isinstance(words, str):
@@ -347,7 +347,7 @@ class _Runs:
         return result
 
     def lost(self) -> str:
-        """Why a test that passed must fail: it missed a run or its failure."""
+        """The reason why a test that passed must fail: it missed a run or its failure; "": none."""
         if not self.begun:
             return "the test takes ruedo_regression and has not called it: nothing was judged"
         if self._ended < self.begun:

@@ -85,7 +85,7 @@ class Device(Stream[T]):
 
     @property
     def transform(self) -> Transform:
-        """Its frame in base_link at the start."""
+        """The device's frame in base_link at the start."""
         return Transform(self.position, self.orientation)
 
 
@@ -106,7 +106,7 @@ class Camera(Device[Image]):
 
     @property
     def intrinsics(self) -> Stream[CameraInfo]:
-        """Its pinhole model. Raises UnknownName for none."""
+        """The camera's pinhole model. Raises UnknownName if it has none."""
         return self._part("info")
 
     def _part(self, part: str) -> Stream[Any]:

@@ -107,7 +107,7 @@ class Simulation(Requests):
 
     @property
     def paused(self) -> bool:
-        """As ruedo/info last said it."""
+        """Whether the run is paused, by the latest ruedo/info."""
         return self._info.paused
 
     @property

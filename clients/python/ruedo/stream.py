@@ -252,7 +252,7 @@ class Stream(Reader[T]):
         return sample
 
     def _at(self, utime: int, timeout: float) -> T | None:
-        """None: it is of before what is kept."""
+        """The sample at that time; None if it is older than the kept ones."""
         if not self._has_utime:
             raise TypeError(f"{self.channel} carries {self.type}, whose messages have no time")
         self._subscribe()
@@ -298,7 +298,7 @@ class Stream(Reader[T]):
             raise fault
 
     def _taken(self, reader: Reader[T], arrival: _Arrival) -> _Arrival:
-        """With the lock held."""
+        """Advances the reader to the sample, with the lock held."""
         if reader._seen:
             reader._skipped += max(0, arrival.number - reader._seen - 1)
         reader._seen = arrival.number
@@ -348,7 +348,7 @@ class Stream(Reader[T]):
         return sample
 
     def _unsubscribe(self) -> None:
-        """Its robot is gone."""
+        """Stops when the robot is gone."""
         with self._news:
             source, self._source = self._source, None
         if source:
@@ -362,7 +362,7 @@ class Stream(Reader[T]):
             self._kept_bytes = 0
 
     def _fail(self, error: RuedoError) -> None:
-        """Whatever came, the receiving thread lives."""
+        """Keeps the error for the readers: the receiving thread continues."""
         with self._news:
             self._fault = error
             self._news.notify_all()
@@ -461,7 +461,7 @@ class Stream(Reader[T]):
             raise
 
     def _for(self, reader: Reader[T], a_new_one: bool, not_before: int | None) -> _Arrival | None:
-        """What the reader gets, if that has come. With the lock held."""
+        """The reader's sample, if it has arrived. With the lock held."""
         if not a_new_one:
             return self._newest
         found = None
@@ -474,7 +474,7 @@ class Stream(Reader[T]):
         return found
 
     def _await(self, ready: Callable[[], bool], timeout: float) -> None:
-        """With the lock held."""
+        """Waits until ready() or the timeout, with the lock held."""
         if ready():
             return
         deadline, me = time.monotonic() + timeout, threading.get_ident()

@@ -42,7 +42,7 @@ def tell(text: str) -> None:
 
 
 def drop(descriptor: int) -> None:
-    """What goes there from now on, and what is buffered, which is written at the program's end."""
+    """Discards later output, and the buffered, which is written at the program's end."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)

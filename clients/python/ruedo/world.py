@@ -299,7 +299,7 @@ def _path(path: Way, z: float) -> str:
 
 
 def _added(sensors: Mapping[str, str], link: str) -> str:
-    """To a robot's link, by SDF's parameter passing."""
+    """The SDF that adds sensors to a robot's link, by parameter passing."""
     if not sensors:
         return ""
     made = ""

@@ -19,7 +19,7 @@ _MOST_PARTS, _MOST_BYTES = 1024, 64 << 20  # of an info
 
 
 class WorldInfo:
-    """One complete ruedo/info; immutable."""
+    """A complete ruedo/info; immutable."""
 
     def __init__(self, parts: list[Any]):
         head = parts[0]

@@ -111,7 +111,7 @@ void add_complete(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("complete", "words for the completion of shells");
   command->group("");
   const auto given = std::make_shared<Words>();
-  command->add_option("WORDS", *given, "after --: what stands on the line, without ruedo");
+  command->add_option("WORDS", *given, "after --: the words of the line, without ruedo");
   command->callback([given, &app, &chosen] {
     chosen = [given, &app] {
       Words& words = *given;

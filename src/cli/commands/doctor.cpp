@@ -319,9 +319,9 @@ int doctor(const std::string& url, bool ros2) {
 }
 
 void add_doctor(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand(
-      "doctor",
-      "check this machine: multicast route, buffers, renderer, versions; each fault with its cure");
+  CLI::App* command = app.add_subcommand("doctor",
+                                         "check this machine: multicast route, buffers, renderer, "
+                                         "versions; print how to fix each fault");
   const auto url = std::make_shared<std::string>();
   command->add_option("--lcm", *url, "LCM address to check")->type_name("URL");
   const auto ros2 = std::make_shared<bool>(false);

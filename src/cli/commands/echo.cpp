@@ -270,7 +270,8 @@ void add(CLI::App& app, Action& chosen, const char* name, const char* help, cons
   if (action == echo) {
     add_types_argument(*command);
     command
-        ->add_option("--timeout", arguments->timeout_s, "end with 1 when nothing came for so long")
+        ->add_option("--timeout", arguments->timeout_s,
+                     "exit with 1 after so many seconds without a message")
         ->type_name("S")
         ->check(within(1e-3, 1e9));
   }

@@ -107,7 +107,7 @@ int export_log(const ExportArguments& arguments) {
   if (arguments.out.empty() == arguments.bag.empty())
     throw InputError({}, "give OUT, or --ros2 FOLDER");
   if (arguments.bag.empty() && (arguments.distro_given || !arguments.remaps.empty()))
-    throw InputError({}, "--remap and --distro are for a bag: they go with --ros2");
+    throw InputError({}, "--remap and --distro apply to a bag only: they need --ros2");
   read_given_types();
   if (arguments.sandboxed)
     enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});

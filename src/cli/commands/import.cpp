@@ -71,7 +71,7 @@ int import_map(const ImportArguments& arguments) {
   const std::filesystem::path path = arguments.map;
   if (is_recorded_drive(path)) return import_drive(arguments);
   if (!arguments.mount.empty() || !arguments.robot.empty())
-    throw InputError({}, "--mount and --of are for recorded drives");
+    throw InputError({}, "--mount and --of apply to recorded drives only");
   std::string kind = path.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -128,26 +128,24 @@ void add_import(CLI::App& app, Action& chosen) {
   CLI::Option* resolution =
       command
           ->add_option("--resolution", arguments->resolution,
-                       "of a picture: side of a pixel, m; of a drive: of its map's cells")
+                       "side of a pixel of a picture, or of a map cell of a drive (m)")
           ->check(within(world::kSmallestCell_m, world::kLargestCell_m));
-  CLI::Option* width = command
-                           ->add_option("--width", arguments->width,
-                                        "of a picture: how wide it is, m (Stage's size)")
-                           ->check(within(1e-3, 1e5))
-                           ->excludes(resolution);
-  command->add_option("--height", arguments->height, "of the walls, m")
+  CLI::Option* width =
+      command->add_option("--width", arguments->width, "width of a picture (m; Stage's size)")
+          ->check(within(1e-3, 1e5))
+          ->excludes(resolution);
+  command->add_option("--height", arguments->height, "height of the walls (m)")
       ->capture_default_str()
       ->check(within(0.01, 100.0));
   CLI::Option* thickness =
-      command->add_option("--thickness", arguments->thickness, "of a .map's lines, m")
+      command->add_option("--thickness", arguments->thickness, "thickness of a .map's lines (m)")
           ->capture_default_str()
           ->check(within(0.001, 10.0));
   command
-      ->add_option(
-          "--mount", arguments->mount,
-          "of a drive: where its range finder is on the robot, X,Y,YAW (m, rad; default 0,0,0)")
+      ->add_option("--mount", arguments->mount,
+                   "pose of a drive's range finder on the robot, X,Y,YAW (m, rad; default 0,0,0)")
       ->type_name("X,Y,YAW");
-  command->add_option("--of", arguments->robot, "of a drive with several robots: which")
+  command->add_option("--of", arguments->robot, "robot to use, of a drive with several")
       ->type_name("ROBOT");
   command->add_flag("--allow-absolute", arguments->allow_absolute,
                     "let a .yaml name a picture outside its folder");

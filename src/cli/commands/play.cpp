@@ -166,7 +166,7 @@ void add_play(CLI::App& app, Action& chosen) {
   compare->type_name("LOG")->excludes("--html");
   command
       ->add_option("--html-size", arguments->html_size,
-                   "at most so large: messages are thinned to fit")
+                   "largest size of the page; messages are thinned to fit")
       ->type_name("MB")
       ->capture_default_str()
       ->check(within(1.0, 1000.0))

@@ -258,7 +258,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
            "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
   add_list(command, "--remap", a.remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
   command.add_flag("--shared-network", a.shared_network,
-                   "no network of its own: for a client that needs other machines");
+                   "use the machine's network: for a client that needs other machines");
 }
 
 void add_expectations(CLI::App& command, RegressArguments& a) {
@@ -270,12 +270,11 @@ void add_expectations(CLI::App& command, RegressArguments& a) {
            "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)", "GOAL");
   command.add_flag("--no-contact", a.expected.no_contact,
                    "the robot touches nothing but the ground");
-  command.add_option("--clearance", a.clearance, "at least so far from everything (m)")
+  command.add_option("--clearance", a.clearance, "smallest allowed distance to anything (m)")
       ->type_name("M")
       ->check(within(0.0, 100.0));
   command
-      .add_option("--odometry-error", a.odometry_error,
-                  "odometry at most so far from the truth (m)")
+      .add_option("--odometry-error", a.odometry_error, "largest allowed error of the odometry (m)")
       ->type_name("M")
       ->check(within(0.0, 1e6));
   command
@@ -287,8 +286,9 @@ void add_expectations(CLI::App& command, RegressArguments& a) {
                    "the client may move the robot by requests (SET_POSE, RESET, REMOVE, ...)");
   command.add_flag("--allow-errors", a.allow_errors, "run a world that has errors");
   command
-      .add_option("--script", a.script,
-                  "command line that judges too, by its exit code; RUEDO_LOG is the run's log")
+      .add_option(
+          "--script", a.script,
+          "command line of a further check: it fails by its exit code; RUEDO_LOG is the log")
       ->type_name("COMMAND");
 }
 
@@ -296,8 +296,8 @@ void add_golden(CLI::App& command, RegressArguments& a) {
   command.add_option("--golden", a.golden, "log to compare with")->type_name("FILE");
   add_list(command, "--keep", a.keep,
            "channels that golden logs hold; shell patterns (default: */pose)", "PATTERN");
-  add_list(command, "--tolerance", a.tolerances, "as of ruedo diff", "RULE");
-  add_list(command, "--ignore", a.ignored, "as of ruedo diff", "PATTERN");
+  add_list(command, "--tolerance", a.tolerances, "tolerance, as in ruedo diff", "RULE");
+  add_list(command, "--ignore", a.ignored, "fields to ignore, as in ruedo diff", "PATTERN");
   command.add_flag("--renew", a.renew,
                    "rewrite the golden log if everything else holds; or set RUEDO_RENEW=1");
 }
@@ -311,7 +311,7 @@ void add_reports(CLI::App& command, RegressArguments& a) {
       .add_option("--junit", a.junit, "write the verdict as JUnit XML, a test case for each check")
       ->type_name("FILE");
   command.add_option("--html", a.html, "write it as a page with plots")->type_name("FILE");
-  command.add_flag("--no-page", a.no_page, "no page beside the log of a failed run");
+  command.add_flag("--no-page", a.no_page, "write no page beside the log of a failed run");
   // Without it they would do nothing.
   for (const char* each : {"--keep", "--tolerance", "--ignore", "--renew", "--html"})
     command.get_option(each)->needs(command.get_option("--golden"));

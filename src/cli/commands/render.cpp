@@ -214,15 +214,15 @@ void add_video_arguments(CLI::App& command, report::VideoArguments& arguments) {
       ->type_name("FILE");
   command.add_option("--follow", arguments.follow, "the camera follows this robot")
       ->type_name("ROBOT");
-  command.add_option("--fps", arguments.fps, "of the video, frames per second")
+  command.add_option("--fps", arguments.fps, "frame rate of the video (1/s)")
       ->type_name("N")
       ->capture_default_str()
       ->check(within(1.0, 120.0));
-  command.add_option("--rate", arguments.rate, "of the video, log time per its time")
+  command.add_option("--rate", arguments.rate, "log time per second of the video")
       ->type_name("S")
       ->capture_default_str()
       ->check(within(0.001, 1000.0));
-  command.add_option("--from", arguments.from_s, "of the video, log time since its beginning, s")
+  command.add_option("--from", arguments.from_s, "start of the video (s after the log's beginning)")
       ->type_name("T");
   command.add_option("--to", arguments.to_s, "and where it ends, s")->type_name("T");
 }
@@ -243,12 +243,13 @@ void add_render(CLI::App& app, Action& chosen) {
       ->capture_default_str()
       ->excludes(camera);
   command
-      ->add_option("--cut", arguments->cut,
-                   "leave out what is above this height (m); auto: a roof that hides the world")
+      ->add_option(
+          "--cut", arguments->cut,
+          "leave out everything above this height (m); auto: only a roof that hides the world")
       ->type_name("HEIGHT")
       ->capture_default_str()
       ->excludes(camera);
-  command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");
+  command->add_option("--size", arguments->size, "size of the picture in pixels")->type_name("WxH");
   command->add_flag("--rays", arguments->rays,
                     "draw the rays of laser scanners and the cones of sonars");
   add_video_arguments(*command, arguments->video);

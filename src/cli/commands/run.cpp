@@ -133,7 +133,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   for (const std::string& text : arguments.wait_for)
     options.wait_for.push_back(parse_wait_for(text));
   if (arguments.lockstep > 0 && !arguments.wait_for.empty())
-    throw InputError({}, "--lockstep does not go with --wait-for");
+    throw InputError({}, "--lockstep cannot be used with --wait-for");
   options.edited = arguments.viewed;
   options.save = arguments.save;
   options.snapshots = arguments.snapshots;

@@ -135,7 +135,7 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
     fmt::print(out, "{}{}{} ({}; {})", style.bold, robot->name, style.off,
                for_terminal(robot->model), drive_text(*robot));
     if (!others.empty()) {
-      fmt::print(out, ", and alike: ");
+      fmt::print(out, "; identical: ");
       for (size_t i = 0; i < others.size() && i < 3; ++i)
         fmt::print(out, "{}{}", i > 0 ? ", " : "", others[i]);
       if (others.size() > 3)

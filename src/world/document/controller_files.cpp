@@ -112,7 +112,7 @@ void ControllerFiles::load(const std::string& path, bool named, File& file) {
   if (!named && !has("ontroller") && !has("steer_bot")) return;
   bytes_ += text.size();
   if (bytes_ > kMostBytes)
-    throw InputError({path, 0}, "the controllers' files of a world hold no more than " +
+    throw InputError({path, 0}, "the controller files of a world hold more than " +
                                     std::to_string(kMostBytes >> 20) + " MiB");
   file.root = parse_yaml(text, path);
   file.entries = count(*file.root);

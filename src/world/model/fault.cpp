@@ -79,7 +79,7 @@ const std::vector<FaultKind>& fault_kinds() {
       {"lag", Of::device, 1e-6, kLongestDelay_s, "s"},
       {"bias", Of::device, -1e6, 1e6, "added to what it measures, SI"},
       {"scale", Of::device, -1e3, 1e3, "times what it measures"},
-      {"blocked", Of::device, 0, 1e6, "m, what the rays of that part of the view see"},
+      {"blocked", Of::device, 0, 1e6, "m, the range that the blocked rays measure"},
       {"clock_drift", Of::device, -1, 1, "s a second"},
       {"encoder_stuck", Of::wheels, 0, 0, ""},
       {"wheel_slip", Of::wheels, 0.01, 0.95, "part of the wheels' turning that moves nothing"},

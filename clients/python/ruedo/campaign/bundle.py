@@ -25,7 +25,7 @@ def pack(folder: Path, files: Iterable[str]) -> Bundle:
 
 
 def name_of(bundle: Bundle) -> str:
-    """By its content."""
+    """The name of a bundle: a hash of its content."""
     digest = hashlib.sha256()
     for name, content in sorted(bundle.items()):
         digest.update(f"{name}\0{len(content)}\0".encode() + content)

@@ -103,7 +103,7 @@ class Campaign:
 
     @property
     def files_read(self) -> list[Path]:
-        """Its file, all that its cases are made from, and its results."""
+        """The campaign's file, all that its cases are made from, and its results."""
         made_from = [Path(file) for file in self._files] if self.cases else []
         results = [one for kind in _RESULTS for one in self.out.glob(kind)]
         return [*([self.file] if self.file else []), *made_from, *results]
@@ -216,7 +216,7 @@ class Campaign:
             return taken
 
     def case(self, text: str) -> Case:
-        """By its number, or by the beginning of its id."""
+        """The case with this number, or whose id begins so."""
         found = [case for case in self.cases if str(case.number) == text] or [
             case for case in self.cases if len(text) >= 4 and case.id.startswith(text)
         ]
@@ -320,7 +320,7 @@ class Unchanged:
 
 
 class _lock:
-    """One driver at a time; the kernel lets go of it when its holder ends, however that ends."""
+    """Admits one driver at a time; the kernel releases it when its holder ends, however it ends."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

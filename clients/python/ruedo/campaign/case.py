@@ -356,7 +356,7 @@ def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[s
 
 
 def fault_text(fault: dict[str, Any]) -> str:
-    """As `--fault` has it: ROBOT/TARGET:KIND@AT,for=S,value=V."""
+    """The fault as an argument of `--fault`: ROBOT/TARGET:KIND@AT,for=S,value=V."""
     target = fault.get("robot", "") + ("/" + fault["target"] if fault.get("target") else "")
     numbers = "".join(
         f",{name}={fault[key]}"
@@ -449,7 +449,7 @@ def _line(error: BaseException) -> str:
 
 
 def _check_room(folders: Iterable[str]) -> None:
-    """Whatever went wrong with a case on a full disk is not a fault of the case. Raises OSError."""
+    """Raises OSError if the disk is full: then no fault is the case's."""
     for folder in folders:
         with tempfile.TemporaryFile(dir=folder) as file:
             os.posix_fallocate(file.fileno(), 0, _ROOM)

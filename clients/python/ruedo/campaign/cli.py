@@ -77,7 +77,7 @@ class _Once(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Its subparsers are of this class, too."""
+    """A parser that refuses repeated options; its subparsers are of this class, too."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -255,7 +255,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _name_unknown_programs(campaign: Any) -> None:
-    """Nothing is run again when they change."""
+    """Warns about controllers whose program files are unknown: cases are not run again when they
+    change.
+    """
     made = {case.controller: case.what["controller"] for case in campaign.cases}
     for name, one in made.items():
         if "command" in one and not one["files"]:

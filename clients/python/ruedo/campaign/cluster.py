@@ -188,7 +188,7 @@ def _run(
 def _remote(
     packed: list[Any], name: str, case: Case, folder: str, version: str
 ) -> tuple[dict[str, Any], float, str]:
-    """In a process of Ray's, on some node: the case, in a worker of its own as on one machine."""
+    """Runs the case on a node of Ray, in a worker of its own as on one machine."""
     import ray
 
     from .. import _engine

@@ -13,7 +13,7 @@ from ..arguments import finite, shown
 from ..engine import Engine
 
 DONE = "done"
-"""What a controller answers to end its run."""
+"""A controller returns this to end its run."""
 
 
 class NothingYet(LookupError):
@@ -25,10 +25,11 @@ class NothingYet(LookupError):
 class View:
     """The robot as its controller in the engine sees it at a decision.
 
-    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(); NothingYet
-    where none has come, which a controller may leave to its caller. "lrf.ranges" in view tells
-    whether one has. view.time: s of sim time. view.parameters and view.seed: of the case.
-    view.send(channel, message): a command other than a velocity.
+    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(). Raises
+    NothingYet before the first message; a controller need not catch it, and the robot waits.
+    "lrf.ranges" in view says whether there is a message. view.time: s of sim time.
+    view.parameters and view.seed: of the case. view.send(channel, message): a command other
+    than a velocity.
     """
 
     def __init__(self, engine: Engine, robot: str, parameters: dict[str, Any], seed: int) -> None:

@@ -46,7 +46,7 @@ class Function:
 
     @property
     def is_installed(self) -> bool:
-        """In a package: what lies beside it is not the campaign's."""
+        """Whether it is in a package: files beside it are not the campaign's."""
         return _is_packaged(str(self.file))
 
     def load(self) -> Any:
@@ -122,7 +122,7 @@ def _is_packaged(file: str) -> bool:
 
 
 def _file_of(module: str, folder: Path) -> Path:
-    """Of a module that is found and not imported: its package may do anything."""
+    """The file of a module, without importing it: its package may do anything."""
     first, *rest = module.split(".")
     try:
         find = importlib.machinery.PathFinder.find_spec

@@ -97,7 +97,7 @@ class Folders:
 
 
 def hash_of(files: dict[str, str]) -> str:
-    """One for all of them, and for their names."""
+    """One hash of all these files and their names."""
     return hashlib.sha256(repr(sorted(files.items())).encode(errors="backslashreplace")).hexdigest()
 
 

@@ -69,7 +69,7 @@ def in_a_line(text: str) -> str:
 
 
 def of_controller(text: str) -> str:
-    """As a campaign calls the client of `ruedo regress`."""
+    """The text with a campaign's word for the client of `ruedo regress`."""
     return text.replace("the client", "the controller")
 
 

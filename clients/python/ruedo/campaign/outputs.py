@@ -103,6 +103,6 @@ def _descriptor_of(path: Path) -> int | None:
 
 
 def write_text(file: str | os.PathLike[str], text: str) -> None:
-    """As UTF-8. Raises OSError."""
+    """Writes a file in UTF-8. Raises OSError."""
     with replacing(file) as part:
         part.write_text(text, encoding="utf-8")

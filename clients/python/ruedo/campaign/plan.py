@@ -100,7 +100,7 @@ def _text(value: Any) -> str:
 
 
 def _with_texts(members: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """Those are texts, also where nothing but a parameter stands there, which may be a number."""
+    """The members, with those of these names as texts, even if a parameter made them numbers."""
     return {key: _text(value) if key in names else value for key, value in members.items()}
 
 
@@ -300,7 +300,7 @@ def _check_count(content: dict[str, Any], source: Source) -> None:
 def _check_numbers(
     value: Any, texts: tuple[str, ...], path: tuple[Any, ...], source: Source
 ) -> None:
-    """What a file gives as a number or as the name of a parameter, once that stands there."""
+    """Checks numbers that the file may give as names of parameters, once these are replaced."""
     for at, one in _leaves(value, path):
         if any(name in texts for name in at):
             continue
@@ -539,7 +539,7 @@ class Planner:
         return made
 
     def _named(self, path: tuple[Any, ...], patterns: list[str]) -> dict[str, str]:
-        """Of a folder, what may matter in it."""
+        """The files that match, with their hashes; of a folder those that may matter."""
         named: dict[str, str] = {}
         for i, pattern in enumerate(patterns):
             for one in files_called(pattern, self._folder, (*path, i), self._source, path[-1]):
@@ -633,7 +633,7 @@ def files_called(
 
 
 def canonical(value: Any) -> bytes:
-    """One text for one value."""
+    """The value as JSON: equal values give equal bytes."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode()
 
 

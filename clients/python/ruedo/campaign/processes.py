@@ -88,7 +88,7 @@ def private_mb() -> int:
 
 @contextmanager
 def limit_memory(more_mb: int) -> Iterator[None]:
-    """So much more than there is already; beyond it, MemoryError."""
+    """Limits this process to so many MB more than it has; beyond, MemoryError is raised."""
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     wanted = (private_mb() + more_mb) << 20
     if hard != resource.RLIM_INFINITY:

@@ -284,7 +284,7 @@ def _distributions(results: Results) -> Iterable[str]:
 
 
 def _differ(values: list[float]) -> bool:
-    """By more than their last bits, and by less than numbers can say: a scale can show it."""
+    """Whether a scale can show the difference: above rounding, and finite."""
     low, high = min(values, default=0.0), max(values, default=0.0)
     return math.isfinite(high - low) and high - low > 1e-9 * max(abs(low), abs(high))
 

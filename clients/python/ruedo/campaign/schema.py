@@ -272,7 +272,7 @@ def check(content: Any, source: Source) -> None:
 
 
 def _is_whole(_: Any, value: Any) -> bool:
-    """As Python counts: for JSON's schemas 2.0 is a whole number, too."""
+    """Whether it is an int: for JSON's schemas 2.0 is a whole number, too."""
     return isinstance(value, int) and not isinstance(value, bool)
 
 

@@ -111,7 +111,7 @@ class WorldFiles:
 
 
 def model_of(spawn: str) -> str:
-    """As --spawn has it: `model://robot` has a colon, too."""
+    """The model of an argument of --spawn: `model://robot` has a colon, too."""
     model = spawn.rpartition("@")[0]
     before, colon, name = model.rpartition(":")
     return before if colon and "/" not in name else model

@@ -71,7 +71,7 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What users should see."""
+    """The public names."""
     return sorted(__all__)
 
 

@@ -38,7 +38,7 @@ class CameraVectorEnv(TaskVectorEnv):
 
 
 class CameraEnv(TaskEnv):
-    """One of them."""
+    """One environment of the camera task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Camera, **options)

@@ -80,7 +80,7 @@ class CorridorVectorEnv(TaskVectorEnv):
 
 
 class CorridorEnv(TaskEnv):
-    """One of them."""
+    """One environment of the corridor task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Corridor, **options)

@@ -47,7 +47,7 @@ class CrowdVectorEnv(TaskVectorEnv):
 
 
 class CrowdEnv(TaskEnv):
-    """One of them."""
+    """One environment of the crowd task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Crowd, **options)

@@ -234,7 +234,7 @@ class DriveTask(Task):
 
 
 class GoalTask(DriveTask):
-    """To a goal on the floor, which the scene has as ``goal`` (m, m), without touching anything.
+    """Drive to a goal on the floor, the scene's ``goal`` (m, m), without touching anything.
 
     Observes the goal as "goal": its distance / 8 m, cut at 1, and the cosine and sine of its
     bearing, from the true pose; unless ``tells_goal`` is False.
@@ -308,8 +308,8 @@ def _sonars(*ranges: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def goal_term(to_goal: NDArray[np.float64], heading: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of (n, 2) m to the goal in the world and n headings (rad): distance / 8 m, cosine and sine of
-    the bearing.
+    """The goal's distance / 8 m, and cosine and sine of its bearing, (n, 3). to_goal: (n, 2) m, in
+    the world. heading: (n,) rad.
     """
     bearing = np.arctan2(to_goal[:, 1], to_goal[:, 0]) - heading
     distance = np.hypot(to_goal[:, 0], to_goal[:, 1])
@@ -317,7 +317,7 @@ def goal_term(to_goal: NDArray[np.float64], heading: NDArray[np.float64]) -> NDA
 
 
 def _within(values: NDArray[Any], space: spaces.Space[Any]) -> NDArray[Any]:
-    """In the space's type, and, for numbers, cut at its limits."""
+    """The values in the space's type; numbers are clipped to its limits."""
     assert isinstance(space, spaces.Box)
     if space.dtype == np.uint8:
         return values

@@ -274,7 +274,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     def step(
         self, actions: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
-        """One action in every environment."""
+        """Takes one action in every environment."""
         self._refuse_sent("step()")
         return self._act(checked_actions(actions, self.action_space))
 
@@ -533,7 +533,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             raise gymnasium.error.ResetNeeded(f"call reset(){which} before {call}")
 
     def _restore_worlds(self, episodes: list[_SavedEpisode], into: list[int]) -> None:
-        """Of one world into many in one call: that takes all cores."""
+        """Restores one world into many in one call if it can, which uses all cores."""
         if len(into) > 1 and all(episode is episodes[0] for episode in episodes):
             self._engine.restore(episodes[0].world, into)
             return

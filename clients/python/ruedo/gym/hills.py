@@ -63,7 +63,7 @@ class HillsVectorEnv(TaskVectorEnv):
 
 
 class HillsEnv(TaskEnv):
-    """One of them."""
+    """One environment of the hills task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Hills, **options)

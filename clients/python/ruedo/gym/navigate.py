@@ -44,7 +44,7 @@ class NavigateVectorEnv(TaskVectorEnv):
 
 
 class NavigateEnv(TaskEnv):
-    """One of them."""
+    """One environment of the navigation task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Navigate, **options)

@@ -107,7 +107,7 @@ class PushVectorEnv(TaskVectorEnv):
 
 
 class PushEnv(TaskEnv):
-    """One of them."""
+    """One environment of the push task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Push, **options)

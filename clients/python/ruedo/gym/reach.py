@@ -78,7 +78,7 @@ class ReachVectorEnv(TaskVectorEnv):
 
 
 class ReachEnv(TaskEnv):
-    """One of them."""
+    """One environment of the reach task."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(Reach, **options)

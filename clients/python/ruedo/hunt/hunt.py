@@ -234,7 +234,7 @@ def _without_impossible(outcome: Outcome) -> Outcome:
 
 
 def _run(crew: Crew, cases: list[Case | Outcome]) -> list[Outcome]:
-    """In the order of the cases; what has its outcome already keeps it."""
+    """The outcomes in the order of the cases; finished ones are kept."""
     wanted = list({case.id: case for case in cases if isinstance(case, Case)}.values())
     found = {case.id: outcome for case, outcome, _ in crew.run(wanted)}
     return [found[case.id] if isinstance(case, Case) else case for case in cases]

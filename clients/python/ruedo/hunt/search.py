@@ -1,5 +1,5 @@
-"""Who proposes cases: Optuna, after the corners of the space; Hypothesis, by its own draws; or
-chance, to compare with.
+"""The searches that propose cases: Optuna, after the corners of the space; Hypothesis, by its own
+draws; or chance, for comparison.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _suggest(trial: Any, one: Any) -> Any:
 
 
 def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hit | None:
-    """Its draws like ends and simple numbers; target() climbs; and it shrinks what it finds."""
+    """Hypothesis prefers ends and simple numbers, climbs by target(), and shrinks its finding."""
     try:
         import hypothesis
         from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""What a hunt may choose, as dimensions with a neutral value each: parameters, obstacles, faults,
+"""The dimensions that a hunt chooses in, each with a neutral value: parameters, obstacles, faults,
 the seed.
 """
 
@@ -31,7 +31,7 @@ class Dimension:
     alone: bool = True  # whether a case at its corner alone says anything
 
     def corners(self) -> list[Any]:
-        """Where programs break: the ends, the simple value, nought."""
+        """Values at which programs break: the ends, the simple value, zero."""
         if self.options:
             return list(self.options)
         zero = [0.0] if self.low < 0.0 < self.high else []

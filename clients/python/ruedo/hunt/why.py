@@ -214,8 +214,8 @@ class Answer:
 
 
 def why(path: str, seeds: int = 5) -> Answer:
-    """Of a log that a campaign kept, or another one of a run in which the first robot touched
-    something. seeds: how many others are tried.
+    """Explains a failure in a log that a campaign kept, or in another log of a run in which the
+    first robot touched something. seeds: the number of other seeds to try.
     """
     recorded = Recorded.read(path)
     case = _case_of(path)
@@ -257,7 +257,7 @@ def _other_parameters(campaign: Campaign, case: Case) -> list[tuple[str, bool, s
 def _without_models(
     crew: Crew, campaign: Campaign, case: Case, answer: Answer
 ) -> Iterator[tuple[str, bool, str]]:
-    """One left out at a time, first what was touched."""
+    """Leaves out one model at a time, the touched ones first."""
     world = case.what["world"]
     files = campaign.worlds.read_with(world["file"], world["spawn"])
     text = read_bytes(

@@ -84,7 +84,7 @@ class CallbackQueue:
                     self._news.notify()
 
     def stop(self) -> None:
-        """Nothing begins to run any more."""
+        """Lets no further callback begin."""
         self._closed = True
         with self._news:
             self._news.notify_all()
@@ -108,7 +108,7 @@ class CallbackQueue:
             thread.join()
 
     def _drop(self) -> list[Any]:
-        """With the lock held."""
+        """Drops superseded calls, with the lock held."""
         seen: set[Any] = set()
         kept: deque[tuple[Any, int, Call]] = deque()
         dropped: list[Any] = []

@@ -52,7 +52,7 @@ class PrivateServer(Protocol):
     """A server that ends with its client."""
 
     def ended(self) -> str | None:
-        """Why the server is gone; None while it runs."""
+        """The reason why the server is gone; None while it runs."""
 
     def is_done(self) -> bool:
         """Whether it has ended in good order."""
@@ -66,7 +66,7 @@ class PrivateServer(Protocol):
         """The server's warnings since the last call."""
 
     def forked(self) -> None:
-        """In a fork's child: the server is the parent's."""
+        """For a fork's child: leaves the server to the parent."""
 
 
 class Connection:
@@ -409,7 +409,7 @@ class Connection:
         self._over = f"{text}, at {self.url}"
 
     def is_of_our_run(self, run_id: int, may_take_over: bool = False) -> bool:
-        """Of a message that came. may_take_over: or of the run that has taken its place."""
+        """Whether a message is of this client's run. may_take_over: or of its replacement."""
         known = self._known
         if known is None:
             return False
@@ -517,9 +517,9 @@ _joined: dict[int, Iterator[int]] = {}  # by run: counts the clients of this pro
 
 
 def _ids_from(name: bytes, info: WorldInfo) -> int:
-    """Where a client that joins at that time begins to number its primitives: apart from others',
-    and from those of its own that an earlier start of the program has left under way. Equal runs in
-    lockstep have equal numbers, since their logs are compared.
+    """The first number of the primitives of a client that joins at that time: apart from others',
+    and from those that an earlier start of the program left under way. Equal runs in lockstep
+    have equal numbers, since their logs are compared.
     """
     value = 2166136261  # FNV-1a
     for byte in name:

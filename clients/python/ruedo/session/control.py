@@ -81,9 +81,7 @@ class Session:
         return self._checked(reply)
 
     def turn(self) -> threading.Lock:
-        """For grants, which are not answered by replies: keeps other requests waiting while it is
-        held.
-        """
+        """The lock that makes other requests wait while a grant, which has no reply, is sent."""
         return self._one_at_a_time
 
     def next_sequence(self) -> int:

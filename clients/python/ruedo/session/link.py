@@ -1,4 +1,4 @@
-"""What the parts of a connection use of it.
+"""The interface of a connection for its own parts.
 
 Requests, lockstep, streams and primitives know this; Connection, which has them all, offers it.
 """

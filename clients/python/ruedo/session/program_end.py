@@ -50,8 +50,8 @@ class CallbackFaults:
             raise error
 
     def print_kept(self) -> None:
-        """Where another exception is on its way. The program still ends with an exit code that is
-        not 0, unless a call has raised one of these before."""
+        """Prints the kept error when another exception is on its way. The program still ends with
+        an exit code that is not 0, unless a call has raised one of these before."""
         error, what = self._take()
         if error is None:
             return

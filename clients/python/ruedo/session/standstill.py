@@ -39,7 +39,7 @@ class Standstill:
         )
 
     def reason(self) -> str:
-        """Why the call waits in vain; "": sim time advances, or the reason is unknown."""
+        """The reason why the call waits in vain; "": sim time advances, or it is unknown."""
         stands_for = self._stands_for()
         return self._why() if stands_for >= 1.0 or self._since == self._began else ""
 

@@ -32,7 +32,7 @@ class Address:
 
 
 def read_address(url: str) -> Address:
-    """As the server reads it. Raises NoServer for a text that is not an address."""
+    """The address, read as the server reads it. Raises NoServer if the text is not an address."""
     try:
         return _address(url)
     except ValueError as error:

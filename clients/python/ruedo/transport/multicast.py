@@ -49,7 +49,7 @@ class _Partial:
     memory: int = 0
 
     def joined(self) -> bytes | None:
-        """None unless the fragments follow each other without a gap."""
+        """The whole message; None unless the fragments follow each other without a gap."""
         at, pieces = 0, []
         for number in range(self.count):
             offset, data = self.fragments[number]
