@@ -10,7 +10,7 @@
 namespace ruedo {
 namespace {
 
-TEST(BigEndian, IsWhatTheCLibraryHas) {
+TEST(BigEndian, EqualsTheCLibrary) {
   for (const uint64_t value : {uint64_t{0}, uint64_t{1}, uint64_t{0x0123456789abcdef},
                                uint64_t{0xfedcba9876543210}, UINT64_MAX}) {
     const uint64_t of_libc = htobe64(value);

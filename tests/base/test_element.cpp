@@ -63,7 +63,7 @@ TEST(Element, ReadsNumbers) {
   EXPECT_EQ(sensor("1").number("scan/min", 0.25, Allowed::any(quantity::kRange)), 0.25);
 }
 
-TEST(Element, NumbersThatAreNone) {
+TEST(Element, RejectsMalformedNumbers) {
   for (const char* text : {"", "abc", "1,5", "1.5m", "1 2", "0x10", "--1", "+-1", "nan", "inf",
                            "-inf", "1e999", "1.5.2", "NaN", "٣"}) {
     const std::string error =
@@ -73,7 +73,7 @@ TEST(Element, NumbersThatAreNone) {
   }
 }
 
-TEST(Element, NumbersThatAreTooLarge) {
+TEST(Element, RejectsNumbersThatAreTooLarge) {
   const auto read = [](const char* text, Allowed allowed) {
     return error_of([&] { sensor(text).number("range/max", 1, allowed); });
   };
@@ -98,7 +98,7 @@ TEST(Element, NumbersThatAreTooLarge) {
               HasSubstr("'1e9' is too large for an angle"));
 }
 
-TEST(Element, SaysWhatIsAllowed) {
+TEST(Element, ErrorsListTheAllowedValues) {
   EXPECT_EQ(
       error_of([] { sensor("0").number("range/max", 1, Allowed::positive(quantity::kRange)); }),
       "robot.sdf:3: <sensor/range/max>: '0' is not allowed; allowed is a number above 0");
@@ -115,7 +115,7 @@ TEST(Element, SaysWhatIsAllowed) {
   EXPECT_EQ(sensor("1").number("range/max", 1, Allowed::between(0, 1)), 1.0);
 }
 
-TEST(Element, InfinityOnlyWhereItIsAskedFor) {
+TEST(Element, AcceptsInfinityOnlyWhereAllowed) {
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(sensor("inf").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()),
             infinity);
@@ -212,7 +212,7 @@ TEST(Element, ReadsPoses) {
   EXPECT_EQ(root.pose("pose").translation, Vec3::Zero());
 }
 
-TEST(Element, PosesThatAreNone) {
+TEST(Element, RejectsMalformedPoses) {
   struct Case {
     const char* text;
     std::vector<std::pair<std::string, std::string>> attributes;

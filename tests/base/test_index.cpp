@@ -56,7 +56,7 @@ TEST(IndexedVector, IsWalkedThroughByItsIndex) {
   for (const BodyIndex body : Bodies().indices()) FAIL() << body;
 }
 
-TEST(IndexedVector, OfBooleansIsOneToo) {
+TEST(IndexedVector, HoldsBooleans) {
   IndexedVector<LinkIndex, bool> list(2);
   list[LinkIndex(1)] = true;
   EXPECT_FALSE(list[LinkIndex(0)]);

@@ -159,7 +159,7 @@ TEST(SineAndCosine, AtOnceAreTheSameBits) {
   }
 }
 
-TEST(Math, KnowsWhatIsNoNumber) {
+TEST(Math, RecognisesNan) {
   EXPECT_TRUE(std::isnan(math::sin(kInf)) && std::isnan(math::acos(1.0 + 0x1p-52)) &&
               std::isnan(math::log(-1.0)));
   EXPECT_EQ(math::log(0.0), -kInf);

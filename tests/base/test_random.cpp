@@ -160,7 +160,7 @@ TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
 }
 
 // Correlation between neighbours of every kind: within the 99.9 % interval of independent normals.
-TEST(RandomSource, ReseededItIsWhatItWouldHaveBeenFromTheStart) {
+TEST(RandomSource, ReseedingEqualsAFreshSource) {
   RandomSource source(1, "p3at", "lrf");
   const RandomSource copy = source;
   RandomStream begun = source.stream(5);

@@ -109,7 +109,7 @@ TEST(Schema, AVisitorMayEndEarly) {
   EXPECT_EQ(calls, 4);
 }
 
-TEST(Schema, RefusesWhatIsNotOneWholeMessage) {
+TEST(Schema, RefusesAnythingButOneWholeMessage) {
   const Schema& schema = *find_schema("contact_t");
   const auto good = encode(two_contacts());
   ASSERT_TRUE(well_formed(schema, good));

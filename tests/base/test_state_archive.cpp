@@ -48,7 +48,7 @@ std::vector<uint8_t> written(Kept kept) {
   return archive.written();
 }
 
-TEST(StateArchive, ReadsWhatWasWritten) {
+TEST(StateArchive, ReadsBackWrittenValues) {
   const std::vector<uint8_t> bytes = written(example());
   StateArchive archive(bytes);
   Kept kept;
@@ -73,7 +73,7 @@ TEST(StateArchive, ReadsWhatWasWritten) {
   // Not the bytes written once more: those between the members of a struct are anything.
 }
 
-TEST(StateArchive, RefusesWhatIsCutOff) {
+TEST(StateArchive, RefusesTruncatedData) {
   const std::vector<uint8_t> bytes = written(example());
   for (size_t size = 0; size < bytes.size(); ++size) {
     const std::span<const uint8_t> all(bytes);

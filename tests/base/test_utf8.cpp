@@ -6,7 +6,7 @@
 namespace ruedo {
 namespace {
 
-TEST(Utf8, WhatIsNotUtf8BecomesAQuestionMark) {
+TEST(Utf8, InvalidBytesBecomeQuestionMarks) {
   EXPECT_EQ(printable("a\u00e9\u20ac\U0001f916z"), "a\u00e9\u20ac\U0001f916z");
   EXPECT_EQ(printable("a\xe9z"), "a?z");             // Latin 1
   EXPECT_EQ(printable("\xc0\xaf"), "??");            // longer than it needs to be
@@ -36,7 +36,7 @@ TEST(Utf8, TerminalsGetNoMarksThatReorderText) {
     EXPECT_EQ(for_terminal(shown), shown);
 }
 
-TEST(Utf8, WhatIsLongIsShortenedBetweenCharacters) {
+TEST(Utf8, ShortensLongTextsBetweenCharacters) {
   EXPECT_EQ(shortened("abc", 3), "abc");
   EXPECT_EQ(shortened("abcd", 3), "abc...");
   EXPECT_EQ(shortened("a\u20acb", 4), "a\u20ac...");

@@ -13,7 +13,7 @@
 namespace ruedo {
 namespace {
 
-TEST(Whole, HoldsWhatTheTypeHolds) {
+TEST(Whole, ConvertsNumbersWithinTheTypesRange) {
   EXPECT_EQ(whole(-0x1p63), std::numeric_limits<int64_t>::min());
   EXPECT_EQ(whole(9223372036854774784.0), 9223372036854774784);  // the largest double below 2^63
   EXPECT_EQ(whole<uint64_t>(18446744073709549568.0), 18446744073709549568u);
@@ -27,7 +27,7 @@ TEST(Whole, HoldsWhatTheTypeHolds) {
   EXPECT_EQ(microseconds(0.0000015), 2);
 }
 
-TEST(Whole, ThrowsForWhatItDoesNot) {
+TEST(Whole, ThrowsForNumbersOutsideTheTypesRange) {
   const double infinity = std::numeric_limits<double>::infinity(),
                nan = std::numeric_limits<double>::quiet_NaN();
   for (const double value :

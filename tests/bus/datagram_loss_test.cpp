@@ -55,7 +55,7 @@ struct Socket {
 };
 
 // A datagram that was sent and does not arrive was lost: on loopback only the socket can lose it.
-TEST(DatagramLoss, IsWhatAListenerMissed) {
+TEST(DatagramLoss, CountsDatagramsThatAListenerMissed) {
   constexpr int kSent = 200;
   const Socket listener, sender;
   const int smallest = 1;

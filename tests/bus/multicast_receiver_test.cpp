@@ -169,7 +169,7 @@ TEST_F(Multicast, AnnouncedSizesCostNothing) {
 }
 
 // What no fragment brought is not made up: no memory of ours goes out in a message.
-TEST_F(Multicast, MessagesWithGapsAreNone) {
+TEST_F(Multicast, DropsMessagesWithGaps) {
   std::vector<Bytes> parts = fragments("c", Bytes(300, 3), 1, 100);
   parts[1][15] = 50;  // its offset: over the first, with a gap behind
   for (const Bytes& part : parts) read(part);
@@ -182,7 +182,7 @@ TEST_F(Multicast, MessagesWithGapsAreNone) {
 }
 
 // 80 MB of them at most, and the newest go on.
-TEST_F(Multicast, WhatDoesNotEndIsForgotten) {
+TEST_F(Multicast, ForgetsUnfinishedMessages) {
   const std::vector<Bytes> parts = fragments("c", Bytes(200'000, 3), 1, 65'000);
   for (uint16_t sender = 0; sender < 200; ++sender)
     for (size_t i = 0; i + 1 < parts.size(); ++i) read(parts[i], {1, sender});
@@ -190,7 +190,7 @@ TEST_F(Multicast, WhatDoesNotEndIsForgotten) {
   EXPECT_EQ(heard_.size(), 1u);
 }
 
-TEST_F(Multicast, WhatIsNotLcmIsPassedOver) {
+TEST_F(Multicast, IgnoresDatagramsThatAreNotLcm) {
   for (const Bytes& bad : {Bytes{}, Bytes{'L', 'C', '0', '2'}, Bytes(8, 0), Bytes(100, 0xff),
                            short_message("", {1}), short_message(std::string(64, 'n'), {1})}) {
     read(bad);

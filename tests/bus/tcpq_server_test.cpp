@@ -155,7 +155,7 @@ TEST(TcpqServer, SendsAtOnce) {
   EXPECT_EQ(accepted, 1);
 }
 
-TEST(TcpqServer, KnowsWhatIsHeard) {
+TEST(TcpqServer, KnowsTheSubscribedChannels) {
   Served served;
   EXPECT_FALSE(served.server.is_heard("out/1"));
   uint64_t audience = served.server.audience();
@@ -205,7 +205,7 @@ TEST(TcpqServer, ListensAnew) {
   ASSERT_TRUE(soon([&] { return served.heard == 1001; }));
 }
 
-TEST(TcpqServer, ASlowClientLosesMessagesAndHoldsNobodyUp) {
+TEST(TcpqServer, ASlowClientLosesMessagesAndDelaysNoOther) {
   Served served;
   Raw slow(served.server.port());
   ASSERT_TRUE(slow.send(hello()) && slow.send(subscription(2, ".*")));
@@ -263,7 +263,7 @@ TEST(TcpqServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
   EXPECT_TRUE(soon([&] { return served.server.connections() == 1; }));
 }
 
-TEST(TcpqServer, StopDeliversWhatWasPublishedLast) {
+TEST(TcpqServer, StopDeliversTheLastMessages) {
   for (int round = 0; round < 5; ++round) {
     Served served;
     Stock listener(served.url, "out");
@@ -394,7 +394,7 @@ TEST_F(TcpqHostile, OneProcessHasNotAllPlaces) {
   ASSERT_TRUE(soon([&] { return served.server.connections() == TcpqServer::kMostClients; }));
 }
 
-TEST_F(TcpqHostile, WhoDoesNotGreetIsSentAway) {
+TEST_F(TcpqHostile, DisconnectsAClientWithoutAHello) {
   Raw raw(served.server.port());
   EXPECT_TRUE(raw.closed(10'000));
 }

@@ -62,7 +62,7 @@ TEST(TcpqReader, InPiecesOfEverySize) {
   }
 }
 
-TEST(TcpqReader, RefusesWhatIsNone) {
+TEST(TcpqReader, RefusesMalformedStreams) {
   const std::string name(64, 'n');
   for (const std::string& stream : {
            std::string("GET / HTTP/1.1\r\n\r\n"),
@@ -149,7 +149,7 @@ TEST(TcpqFilter, CountsSubscriptions) {
   EXPECT_TRUE(filter.empty());
 }
 
-TEST(TcpqFilter, WhoAsksForTooMuchGetsEverything) {
+TEST(TcpqFilter, TooManySubscriptionsPassEverything) {
   Filter filter;
   for (size_t i = 0; i < Filter::kMostNames; ++i) filter.subscribe(std::to_string(i));
   EXPECT_FALSE(filter.passes("other"));

@@ -161,7 +161,7 @@ TEST(LcmBus, HearsItsChannelsOnly) {
   EXPECT_EQ(bus.failed(), 0u);
 }
 
-TEST(LcmBus, IsHeardByNobodyOnMemq) { EXPECT_FALSE(LcmBus("memq://").is_heard("p3at/camera")); }
+TEST(LcmBus, HasNoListenersOnMemq) { EXPECT_FALSE(LcmBus("memq://").is_heard("p3at/camera")); }
 
 // poll() refuses two files where a process may have one.
 class FewFiles {

@@ -117,7 +117,7 @@ TEST(UnixServer, BothWaysInOrder) {
   EXPECT_EQ(other.came.back(), (std::pair<std::string, std::string>{"b", "to the other"}));
 }
 
-TEST(UnixServer, KnowsWhatIsHeard) {
+TEST(UnixServer, KnowsTheSubscribedChannels) {
   const Folder folder;
   UnixServer bus(folder.url());
   bus.listen({"in"}, [](const std::string&, const uint8_t*, size_t) {});
@@ -231,7 +231,7 @@ TEST(UnixServer, OfConflatedChannelsASlowClientGetsTheNewest) {
   EXPECT_EQ(served.server.failed(), 0u);
 }
 
-TEST(UnixServer, WhatIsNotConflatedDoesNotWaitForWhatIs) {
+TEST(UnixServer, RepliesOvertakeConflatedChannels) {
   Served served;
   served.server.conflate({"state"});
   Client slow(served, {"state", "reply"});
@@ -289,7 +289,7 @@ TEST(UnixServer, TheLauncherGetsAll) {
   EXPECT_EQ(status, 0);
 }
 
-TEST(UnixServer, WhoTakesNothingHasABound) {
+TEST(UnixServer, DropsAClientThatReadsNothing) {
   Served served;
   Client never(served, {"bulk"}), quick(served, {"out"});
   const std::string block(1 << 20, 'x');
@@ -304,7 +304,7 @@ TEST(UnixServer, WhoTakesNothingHasABound) {
   EXPECT_EQ(quick.came.size(), 1u);
 }
 
-TEST(UnixServer, AllWhoTakeNothingHaveABoundTogether) {
+TEST(UnixServer, DropsClientsThatTogetherAreTooFarBehind) {
   Served served;
   std::list<Client> clients;
   for (int i = 0; i < 5; ++i) clients.emplace_back(served, std::vector<std::string>{"bulk"});
@@ -327,7 +327,7 @@ TEST(UnixServer, OneTooManyIsSentAway) {
   EXPECT_EQ(served.server.refused(), 1u);
 }
 
-TEST(UnixServer, WhoDoesNotGreetIsSentAway) {
+TEST(UnixServer, DisconnectsAClientWithoutAHello) {
   Served served;
   const FileHandle silent = connect_unix(served.folder.url().host);
   char byte;
@@ -335,7 +335,7 @@ TEST(UnixServer, WhoDoesNotGreetIsSentAway) {
   EXPECT_EQ(served.server.refused(), 1u);
 }
 
-TEST(UnixServer, WhatWasPublishedLastComes) {
+TEST(UnixServer, StopDeliversTheLastMessages) {
   auto served = std::make_unique<Served>();
   Client client(*served, {"out"});
   for (int i = 0; i < 1000; ++i) served->publish("out", "12");
@@ -368,7 +368,7 @@ TEST(UnixServer, PathsAreClaimedAndCleared) {
 }
 
 // Scripts wait for the file, and then start what connects.
-TEST(UnixServer, WhoSeesTheSocketMayConnect) {
+TEST(UnixServer, AcceptsAsSoonAsTheSocketExists) {
   const Folder folder;
   const std::string path = folder.url().host;
   std::atomic<bool> over = false;
@@ -420,7 +420,7 @@ TEST(UnixServer, OfTwoThatBeginAtOnceOneServes) {
   EXPECT_TRUE(fs::is_empty(folder.path));
 }
 
-TEST(UnixServer, OneThatAcceptsNobodyIsThere) {
+TEST(UnixServer, AFullQueueStillCountsAsServed) {
   const Folder folder;
   const std::string path = folder.url().host;
   const FileHandle listener = listen_unix(path);

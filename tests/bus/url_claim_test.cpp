@@ -107,7 +107,7 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   EXPECT_EQ(said.size(), 8u);
 }
 
-TEST(RivalWatch, KnowsWhatItsBusKnowsOfListeners) {
+TEST(RivalWatch, ForwardsTheListenersOfItsBus) {
   const RivalWatch watch(std::make_unique<FakeBus>(), [](const std::string&) {});
   EXPECT_TRUE(watch.is_heard("p3at/lrf"));
   EXPECT_FALSE(watch.is_heard("p3at/camera"));

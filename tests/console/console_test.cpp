@@ -40,7 +40,7 @@ std::vector<uint8_t> encoded(const Message& message) {
   return bytes;
 }
 
-TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhatHasNoRoom) {
+TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhenFull) {
   OfferRing ring(64);
   std::vector<uint8_t> message(20);
   for (uint32_t i = 0; i < 50; ++i) {
@@ -88,7 +88,7 @@ TEST(OfferRing, HoldsAllThatManyThreadsWriteInTheOrderOfEach) {
 }
 
 // A reader that keeps up, with a ring that fills again and again.
-TEST(OfferRing, WhatIsDroppedLeavesTheRestWhole) {
+TEST(OfferRing, DroppingLeavesTheRestIntact) {
   OfferRing ring(1024);
   std::atomic<int> writing{2};
   const auto write = [&](uint32_t writer) {
@@ -182,7 +182,7 @@ class EventsTest : public testing::Test {
   Events events{false};
 };
 
-TEST_F(EventsTest, ATouchIsOneCollisionHoweverItBounces) {
+TEST_F(EventsTest, ABouncingTouchIsOneCollision) {
   touch(0.0, {"floor/link"});  // from the beginning: nothing happened
   touch(0.1, {"floor/link", "box/link"});
   touch(0.2, {"floor/link"});
@@ -196,7 +196,7 @@ TEST_F(EventsTest, ATouchIsOneCollisionHoweverItBounces) {
                         "2 collision r: touches box/link", "2 collision r: touches floor/link"}));
 }
 
-TEST_F(EventsTest, WhatBlocksARobotIsNamed) {
+TEST_F(EventsTest, ReportsTheLinkThatBlocksARobot) {
   collisions_t collisions{};
   const auto tell = [&](double time_s, const std::string& by) {
     collisions.blocked_by = by;
@@ -235,7 +235,7 @@ TEST_F(EventsTest, MotionsEndInOneWayOrAnother) {
                 "6 blocked r: velocity is blocked", "7 watchdog r: no command came: stopped"}));
 }
 
-TEST_F(EventsTest, WhatWasCommandedAndAskedForIsTold) {
+TEST_F(EventsTest, ReportsCommandsAndRequests) {
   velocity_command_t velocity{};
   velocity.vx = 0.5;
   for (int i = 0; i < 30; ++i) apply(1 + 0.1 * i, 0, encoded(velocity), "r/velocity");
@@ -260,7 +260,7 @@ TEST_F(EventsTest, WhatWasCommandedAndAskedForIsTold) {
                         "13 lost : 3 messages could not be sent"}));
 }
 
-TEST_F(EventsTest, ALiveRunTellsWhatWasAnsweredOnceAndBeginsAnewWithAReset) {
+TEST_F(EventsTest, ALiveRunReportsAnswersOnceAndClearsAtAReset) {
   events = Events(true);
   request_t request{};
   request.session = 4;
@@ -320,7 +320,7 @@ TEST_F(EventsTest, FaultsOfTheRunItselfComeWhenTheirTimeDoes) {
   EXPECT_EQ(told().back(), "4 fault r: kidnapped");
 }
 
-TEST_F(EventsTest, WhatIsNoMessageIsNoEventAndThereAreNotTooMany) {
+TEST_F(EventsTest, IgnoresMalformedMessagesAndLimitsTheList) {
   const std::vector<uint8_t> good = encoded(contact_t{});
   for (size_t size = 0; size < good.size(); ++size)
     events.hear(1, "x", std::span(good).first(size));
@@ -364,7 +364,7 @@ class TapTest : public testing::Test {
   Tap tap;
 };
 
-TEST_F(TapTest, CountsAllAndOffersWhatIsWanted) {
+TEST_F(TapTest, CountsAllAndOffersWantedChannels) {
   publish(0);
   EXPECT_THAT(offered(), testing::IsEmpty());  // nobody watches
   tap.watch(true);
@@ -379,14 +379,14 @@ TEST_F(TapTest, CountsAllAndOffersWhatIsWanted) {
   EXPECT_EQ(tap.channel(0).messages, 3u);
 }
 
-TEST_F(TapTest, CommandsAreTakenWhereTheRunTakesThem) {
+TEST_F(TapTest, AcceptsCommandsOnTheRunsInputsOnly) {
   EXPECT_TRUE(tap.takes("p3at/velocity"));
   EXPECT_FALSE(tap.takes("a"));
   EXPECT_FALSE(tap.takes("c"));
 }
 
 // The state of the bodies is there for those who come when no other one will be told.
-TEST_F(TapTest, TheNewestStateIsKeptForThoseWhoComeLater) {
+TEST_F(TapTest, KeepsTheNewestStateForLaterViewers) {
   auto announced = std::make_shared<run::Announcement>();
   announced->channels.add<world_state_t>("ruedo/world", "", "", {});
   announcement = announced;

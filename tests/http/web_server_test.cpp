@@ -104,7 +104,7 @@ std::vector<std::string> started_at_once(int servers, int port) {
   return faults;
 }
 
-TEST(WebServer, TwoThatWantOnePortAtOnceAreToldWhatIsWrong) {
+TEST(WebServer, ServersThatShareAPortReportIt) {
   const int port = server_at(0)->port();
   for (int round = 0; round < 200; ++round) {
     for (const std::string& fault : started_at_once(8, port))
@@ -113,7 +113,7 @@ TEST(WebServer, TwoThatWantOnePortAtOnceAreToldWhatIsWrong) {
   }
 }
 
-TEST(WebServer, ThoseThatTakeAnyPortAllHaveOne) {
+TEST(WebServer, ServersOnPortZeroAllStart) {
   for (int round = 0; round < 20; ++round) EXPECT_THAT(started_at_once(4, 0), testing::IsEmpty());
 }
 
@@ -190,7 +190,7 @@ class Thrower : public Connection {
   bool greeted_ = false;
 };
 
-TEST(WebServer, WhatIsThrownEndsOneConnectionAlone) {
+TEST(WebServer, AnExceptionEndsItsConnectionOnly) {
   WebPlace place;
   place.address.port = 0;
   int opened = 0, ticks = 0;
@@ -227,7 +227,7 @@ TEST(WebServer, WhatIsThrownEndsOneConnectionAlone) {
 }
 
 // 40 of 8 MB each.
-TEST(WebServer, ThoseWhoReadNothingTakeLittleMemoryAndGiveWay) {
+TEST(WebServer, DropsClientsThatReadNothing) {
   Given given;
   WebPlace place;
   place.address.port = 0;

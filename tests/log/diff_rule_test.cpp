@@ -83,7 +83,7 @@ class DiffRuleLaws : public testing::Test {
 
 constexpr int kDraws = 20'000;
 
-TEST_F(DiffRuleLaws, EveryValueStandsForItself) {
+TEST_F(DiffRuleLaws, EveryValueEqualsItself) {
   for (int i = 0; i < kDraws; ++i) {
     const FieldValue each = value();
     const DiffRule any = rule();
@@ -102,7 +102,7 @@ TEST_F(DiffRuleLaws, AbsoluteTolerancesAndAnglesHaveNoDirection) {
   }
 }
 
-TEST_F(DiffRuleLaws, InfinityStandsForThatInfinityAlone) {
+TEST_F(DiffRuleLaws, InfinityEqualsOnlyTheSameInfinity) {
   for (int i = 0; i < kDraws; ++i) {
     const DiffRule any = rule();
     const double other = number();
@@ -113,7 +113,7 @@ TEST_F(DiffRuleLaws, InfinityStandsForThatInfinityAlone) {
   }
 }
 
-TEST_F(DiffRuleLaws, NanStandsForNanAloneWhateverItsBits) {
+TEST_F(DiffRuleLaws, NanEqualsNanOfAnyBits) {
   EXPECT_TRUE(passes(kNan, -kNan, nullptr));
   for (int i = 0; i < kDraws; ++i) {
     const DiffRule any = rule();

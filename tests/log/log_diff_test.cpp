@@ -168,7 +168,7 @@ TEST_F(LogDiffTest, ArraysOfDifferentLengths) {
 }
 
 // A range finder says inf where it has no echo: that is no distance which a tolerance could widen.
-TEST_F(LogDiffTest, NoToleranceReachesFromAnEchoToNone) {
+TEST_F(LogDiffTest, NoToleranceCoversAMissingEcho) {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   const auto write_scan = [](const std::string& path, std::vector<float> ranges) {
@@ -200,7 +200,7 @@ TEST_F(LogDiffTest, LargeIntegersAreComparedExactly) {
   EXPECT_EQ(diff().channels.at("p3at/odometry").fields.at("utime").worst, 1.0);
 }
 
-TEST_F(LogDiffTest, ALogThatIsCutIsNotTheSame) {
+TEST_F(LogDiffTest, ATruncatedLogDiffers) {
   write_log(golden_, 0);
   write_log(other_, 0);
   std::filesystem::resize_file(other_, std::filesystem::file_size(other_) - 5);
@@ -217,7 +217,7 @@ TEST_F(LogDiffTest, ALogThatIsCutIsNotTheSame) {
   EXPECT_THAT(log::diff_junit(diff()), HasSubstr("cut off in the event"));
 }
 
-TEST_F(LogDiffTest, OfALogThatIsKnownToBeCutWhatIsThereIsCompared) {
+TEST_F(LogDiffTest, ComparesTheMessagesOfALogKnownAsTruncated) {
   write_log(golden_, 0);
   write_log(other_, 0);
   std::filesystem::resize_file(other_, std::filesystem::file_size(other_) - 5);
@@ -275,7 +275,7 @@ TEST_F(LogDiffTest, IgnoringEveryFieldLeavesNothingToCompare) {
   EXPECT_FALSE(diff({}, {"p3at/*:th*"}).same());
 }
 
-TEST_F(LogDiffTest, WhatIsNoLogIsRefused) {
+TEST_F(LogDiffTest, RefusesAFileThatIsNotALog) {
   write_log(golden_, 0);
   std::ofstream(other_) << "hello, I am text";
   EXPECT_THROW(diff(), InputError);
@@ -285,7 +285,7 @@ TEST_F(LogDiffTest, WhatIsNoLogIsRefused) {
   EXPECT_THROW(diff(), InputError);
 }
 
-TEST_F(LogDiffTest, ALengthThatLiesDoesNotTakeMemory) {
+TEST_F(LogDiffTest, AForgedLengthAllocatesNothing) {
   write_log(golden_, 0);
   write_log(other_, 0);
   {
@@ -299,7 +299,7 @@ TEST_F(LogDiffTest, ALengthThatLiesDoesNotTakeMemory) {
   EXPECT_THAT(reader.fault(), HasSubstr("cut off"));
 }
 
-TEST(DiffRule, RefusesWhatItCannotRead) {
+TEST(DiffRule, RefusesMalformedRules) {
   for (const char* text : {"", "a", "a:b", "a:b=x", "a:b=abs:-1", "a:b=abs:nan", "a:b=abs:1e-3x",
                            "a:b=size:1", ":b=1", "a:=1"}) {
     EXPECT_THROW(log::DiffRule::tolerance(text), InputError) << text;
@@ -307,7 +307,7 @@ TEST(DiffRule, RefusesWhatItCannotRead) {
   EXPECT_THROW(log::DiffRule::ignoring(""), InputError);
 }
 
-TEST_F(LogDiffTest, ReportsEscapeWhatComesFromFiles) {
+TEST_F(LogDiffTest, ReportsEscapeNamesFromFiles) {
   {
     log::Writer log(golden_);
     write(log, "<b>&\"", odometry(0, 1, 0));

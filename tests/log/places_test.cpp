@@ -8,7 +8,7 @@
 namespace ruedo::log {
 namespace {
 
-TEST(Places, AreThoseThatWereAdded) {
+TEST(Places, FindsEveryAddedPlace) {
   for (const size_t count : {0, 1, 3, 4, 5, 8, 1000}) {  // of pages of four
     const auto file = std::make_shared<PlacesFile>();
     Places places(file, 4), others(file, 4);  // two channels share the file

@@ -116,7 +116,7 @@ TEST(Articulated, AnArmHoldsItsLoadWithoutCreeping) {
 
 // Its joints have turned by the commanded angles in total, and its tip is where these put it: at
 // the product of the joints' rotations.
-TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
+TEST(Articulated, AnArmFollowsItsMotorCommands) {
   for (const int64_t step_us : {5000, 10000}) {
     World w(arm(), step_us);
     const double step_s = static_cast<double>(step_us) * 1e-6;
@@ -172,7 +172,7 @@ TEST(Articulated, AMotorAtItsLimitGivesThat) {
 }
 
 // Motors that drive into their stops: the stops hold, and the motors give what they can.
-TEST(Articulated, StopsHoldWhatMotorsDrive) {
+TEST(Articulated, StopsHoldAgainstMotors) {
   const std::string limit =
       "<limit><lower>-0.2</lower><upper>0.2</upper><effort>50</effort></limit>";
   World w("<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
@@ -298,7 +298,7 @@ TEST(Articulated, ALightTipBearsTheBarBehindIt) {
   EXPECT_NEAR(w.position("m/l9").z(), 0.1 - 0.9 * sine, 1e-6);
 }
 
-TEST(Articulated, AMotorAtAStopGivesWhatIsNeeded) {
+TEST(Articulated, AMotorAtAStopGivesTheNeededEffort) {
   const auto arm = [](const std::string& limit) {
     return "<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
            inertial("0.5 0 0 0 0 0", 2, 0.1, 0.1, 0.1) + "</link>" +
@@ -372,7 +372,7 @@ TEST(Articulated, DampersSinkAtTheRateOfTheirLoad) {
 }
 
 // The same in a loop, and with a servo at its limit beside the damper.
-TEST(Articulated, DampersAddUpAndBearWhatAServoCannot) {
+TEST(Articulated, DampersAddUpAndBearTheRestOfAServosLoad) {
   for (const int64_t step_us : {1000, 5000, 20'000}) {
     const auto slider = [](const std::string& name, double damping) {
       return "<joint name='" + name +

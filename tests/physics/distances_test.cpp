@@ -343,7 +343,7 @@ TEST(Distances, TilesAndRampsCarry) {
   EXPECT_EQ(robot.nearest(0.5).distance, kInfinite);
 }
 
-TEST(Distances, WhatIsLowButNotFlatCounts) {
+TEST(Distances, AKerbCountsAsAnObstacle) {
   Around kerb(kRobot + kPlane + block("kerb", {0.1, 4, 0.05}, at(0.5, 0, 0.025)));
   const double below = std::hypot(0.45 - 0.135, 0.111 - 0.05) - 0.111;  // wheel and edge
   EXPECT_NEAR(kerb.nearest().distance, below, 1e-6);

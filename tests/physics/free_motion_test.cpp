@@ -19,7 +19,7 @@ TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
 
 // In the first state what falls accelerates by gravity and what stands does not; from the first
 // step on the simulation decides.
-TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
+TEST(FreeMotion, TheFirstStateShowsFallingBodies) {
   World w(kPlane + thing("falling", "0 0 5 0 0 0", kBall, 1) +
               thing("standing", "2 0 0.1 0 0 0", kBall, 1) + thing("post", "4 0 1 0 0 0", kBox, 0),
           5000);
@@ -37,7 +37,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
 
 // A mechanism in the air falls as one; one that hangs on the world, or of which a part stands on
 // something, does not fall.
-TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
+TEST(FreeMotion, TheFirstStateShowsFallingMechanisms) {
   const auto two = [](const std::string& name, const std::string& pose, const std::string& more) {
     const std::string inertial =
         "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia>"
@@ -73,7 +73,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
 }
 
 // Links whose origin and centre of mass are half a metre from their hinge, at the same height.
-TEST(FreeMotion, TheFirstStateKnowsWhatHangs) {
+TEST(FreeMotion, TheFirstStateShowsHangingBodies) {
   const auto pendulum = [](const std::string& name, double y, const std::string& dynamics) {
     return "<model name='" + name + "'><pose>0 " + std::to_string(y) +
            " 5 0 0 0</pose><link name='l'><pose>0.5 0 0 0 0 0</pose><inertial><mass>2</mass>"

@@ -186,7 +186,7 @@ TEST(JointKinds, ABevelGear) {
 // On a table that turns freely there is no external moment: with S the moment of inertia of all,
 // and those of table and wheels about its axis, S w + (J - g J) theta1' = 0, and
 // (J + g^2 J - (J - g J)^2 / S) theta1'' = tau.
-TEST(JointKinds, AGearboxTurnsWhatCarriesIt) {
+TEST(JointKinds, AGearboxTurnsItsCarrier) {
   World w(geared("continuous", "r"), 5000);
   w.physics.apply_joint_effort(JointIndex(kParent), 0.5);
   w.run(1.0);
@@ -252,7 +252,7 @@ TEST(JointKinds, AGearboxNeedsItsReference) {
 }
 
 // Hinges on one frame: each is a branch of a tree, until gearboxes close loops between them.
-TEST(JointKinds, MoreLoopsThanAreSolvedAtOnceAreNamed) {
+TEST(JointKinds, WarnsAboutMoreLoopsThanAreSolvedAtOnce) {
   const auto gears = [](int hinges, bool meshed) {
     std::string model = "<model name='m'>" + link("frame", "0 0 1 0 0 0");
     for (int i = 0; i < hinges; ++i) {

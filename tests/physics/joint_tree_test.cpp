@@ -205,7 +205,7 @@ TEST(JointTree, MovesByGaussPrinciple) {
 }
 
 // Where no direction is free, inertias do not matter for the motion, but for what the motors bear.
-TEST(JointTree, WhatIsLedMovesAsItIsTold) {
+TEST(JointTree, DrivenJointsFollowTheirMotors) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     RandomTree tree(seed, 6, true, true);
     const Eigen::VectorXd moves = tree.by_tree(), expected = tree.by_gauss();

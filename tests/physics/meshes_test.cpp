@@ -180,7 +180,7 @@ TEST_F(Hollow, ACupHoldsABall) {
   }
 }
 
-TEST_F(Hollow, OnlyItsHullIfTheFileSaysSo) {
+TEST_F(Hollow, UsesTheHullIfTheFileRequestsIt) {
   World w(kPlane + thing("cup", "0 0 0 0 0 0", mesh(cup(12), "convex_hull"), 0.2, 0.5, 5e-4) +
               ball(0.025, 0.13),
           5000);

@@ -92,14 +92,14 @@ class Tower {
 };
 
 // It loses its fall, and of its slip the friction times that: m v = mu m 2 m/s. It does not rise.
-TEST(Newton, WhatSlipsKeepsTouching) {
+TEST(Newton, ASlippingBodyKeepsItsContact) {
   Tower tower({3.0}, {5.0, 0.0, -2.0});
   EXPECT_TRUE(tower.solve(0.4, 0.4));
   EXPECT_LT((tower.body(1).v - Vec3(5.0 - 0.4 * 2.0, 0.0, 0.0)).norm(), 1e-7);
   EXPECT_NEAR(tower.row(0).impulse, 3.0 * 2.0, 1e-6);
 }
 
-TEST(Newton, WhatSticksStops) {
+TEST(Newton, AStickingBodyStops) {
   Tower tower({3.0}, {0.6, -0.4, -2.0});
   EXPECT_TRUE(tower.solve(0.4, 0.4));
   EXPECT_LT(tower.body(1).v.norm(), 1e-7);
@@ -118,7 +118,7 @@ TEST(Newton, FrictionOfTwoCoefficientsDissipatesTheMost) {
 }
 
 // A ton on a tower of light bodies: all stop, and each contact bears what is above it.
-TEST(Newton, ATowerStopsWhateverItsMasses) {
+TEST(Newton, ATowerOfAnyMassesStops) {
   const std::vector<double> masses = {1.0, 0.01, 1.0, 0.5, 1000.0};
   Tower tower(masses, {0.0, 0.1, -0.05});
   EXPECT_TRUE(tower.solve(0.8, 0.8));
@@ -130,7 +130,7 @@ TEST(Newton, ATowerStopsWhateverItsMasses) {
   }
 }
 
-TEST(Newton, WhatFliesApartIsLeftAlone) {
+TEST(Newton, SeparatingBodiesGetNoImpulse) {
   const Vec3 up(1.0, 0.0, 0.5);
   Tower rising({1.0}, up);
   EXPECT_TRUE(rising.solve(0.8, 0.8));

@@ -94,7 +94,7 @@ TEST(Physics, ThingsAtRestSleepAndStay) {
 }
 
 // <allow_auto_disable>false</allow_auto_disable>, in a model and beside what includes one.
-TEST(Physics, WhatMayNotSleepStaysAwake) {
+TEST(Physics, ABodyThatMayNotSleepStaysAwake) {
   const std::string awake = "<allow_auto_disable>false</allow_auto_disable>";
   std::string a = thing("a", "0 0 0.1 0 0 0", kBox, 1);
   a.insert(a.find("<link"), awake);
@@ -253,7 +253,7 @@ TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
 }
 
 // A joint that is approximated is reported, once and by name.
-TEST(Physics, SimplerJointsAndFrictionAreNamed) {
+TEST(Physics, WarnsAboutSimplifiedJointsAndFriction) {
   const auto shape = [](const std::string& name, const std::string& friction) {
     return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction>" +
            friction + "</friction></surface></collision>";
@@ -424,7 +424,7 @@ TEST(Joints, ASliderGoesAlongItsAxis) {
   EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.6, 0.01);
 }
 
-TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
+TEST(Joints, LinksOfAModelCollideOnlyWithSelfCollide) {
   const auto gap = [](bool self_collide) {
     const std::string box =
         "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></"
@@ -483,7 +483,7 @@ TEST(Physics, ARollingCylinderKeepsItsSpeed) {
   }
 }
 
-TEST(Physics, ConcaveMovingMeshesThatDivideAreNoFinding) {
+TEST(Physics, DividedConcaveMeshesGiveNoFinding) {
   // An L of two boxes as one polyline: extruded, it is a mesh.
   const std::string l =
       "<polyline><point>0 0</point><point>1 0</point><point>1 0.2</point><point>0.2 "

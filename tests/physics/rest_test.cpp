@@ -75,7 +75,7 @@ TEST(Rest, EndsWhenSomethingHitsIt) {
   EXPECT_TRUE(w.physics.sleeping(w.body("b1/l")));
 }
 
-TEST(Rest, EndsWhenWhatItRestsOnIsPushed) {
+TEST(Rest, EndsWhenTheSupportIsPushed) {
   World w(kPlane + thing("under", "0 0 0.1 0 0 0", kBox, 2.0) +
               thing("over", "0 0 0.3 0 0 0", kBox, 2.0),
           5000);

@@ -200,7 +200,7 @@ void expect_still(const std::string& ground, const Thing& thing, double height, 
 }
 
 // What is put down exactly stays, whatever its size.
-TEST_F(Sizes, WhatIsPutDownStands) {
+TEST_F(Sizes, APlacedBodyStands) {
   for (const double s : {0.001, 0.0076, 0.01, 0.019, 0.1, 1.0, 10.0}) {
     const std::vector<std::tuple<const char*, double, Thing>> things{
         {"cube", s, box({s, s, s}, 1000)},
@@ -227,7 +227,7 @@ TEST_F(Sizes, WhatIsPutDownStands) {
 }
 
 // A lying capsule, cylinder or round mesh has no reason to roll.
-TEST_F(Sizes, WhatLiesStays) {
+TEST_F(Sizes, ALyingBodyStays) {
   for (const int64_t step_us : {1000, 5000, 20'000}) {
     for (const double s : {0.002, 0.02, 0.2, 2.0}) {
       for (const Thing& thing : {capsule(s / 4, s, 1000), cylinder(s / 4, s, 1000)}) {

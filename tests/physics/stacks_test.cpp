@@ -71,7 +71,7 @@ TEST(Stacks, BoxesStandWithinAHundredthOfAMillimetre) {
 }
 
 // What is placed exactly stays: all corners are found at once, and before they touch.
-TEST(Stacks, WhatIsPutDownExactlyDoesNotRock) {
+TEST(Stacks, AnExactlyPlacedBodyDoesNotRock) {
   World w(kPlane + stack(15), 5000);
   EXPECT_LT(drift(w, 1), 5e-5);
 }
@@ -100,7 +100,7 @@ TEST(Stacks, AWallOfBricksStands) {
 }
 
 // A mechanism 70 m away requests shorter substeps, for itself only.
-TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
+TEST(Stacks, ADistantBodyChangesNoBit) {
   const std::string windmill =
       "<model name='mill'><pose>70 0 0 0 0 0</pose><link "
       "name='post'><inertial><mass>1</mass></inertial></link>"
@@ -134,7 +134,7 @@ TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
 
 // A single sweep per substep is enough for what is at rest on a slope: it begins with the last
 // friction, in the direction that this had.
-TEST(Stacks, FrictionGoesOnFromTheLastSubstep) {
+TEST(Stacks, FrictionStartsFromTheLastSubstep) {
   World w(
       "<model name='slope'><static>true</static><pose>0 0 0 0 0.4 0</pose><link name='l'>"
       "<collision name='c'><geometry><plane/></geometry><surface><friction><ode><mu>0.8</mu>"

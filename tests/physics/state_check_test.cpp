@@ -31,7 +31,7 @@ std::shared_ptr<const world::WorldModel> hinged(const std::string& mass,
       "/tmp/hinged.sdf");
 }
 
-TEST(StateCheck, NamesWhatIsNotFinite) {
+TEST(StateCheck, ReportsTheBodyThatIsNotFinite) {
   const auto world = hinged("1", "1");
   const world::BodyLayout layout(*world);
   PhysicsWorld physics(*world, layout);
@@ -90,7 +90,7 @@ TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
   }
 }
 
-TEST(StateCheck, StepsThrowForWhatIsNotFinite) {
+TEST(StateCheck, AStepThrowsForAStateThatIsNotFinite) {
   const auto world = hinged("1", "1");
   const world::BodyLayout layout(*world);
   PhysicsWorld physics(*world, layout);

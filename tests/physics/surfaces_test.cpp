@@ -61,7 +61,7 @@ Vec3 sledges(const std::string& mu) {
 }
 
 // Friction too small to measure is no friction, along and across, and nothing becomes infinite.
-TEST(Surfaces, NextToNoFrictionIsNone) {
+TEST(Surfaces, TinyFrictionEqualsNoFriction) {
   for (const std::string mu : {"1e-300", "1e-160", "1e-12"}) {
     EXPECT_NEAR(slide(ode("<mu>" + mu + "</mu><mu2>" + mu + "</mu2>")).x(), 2.0, 1e-6) << mu;
     const std::string two = ode("<mu>" + mu + "</mu><mu2>0.5</mu2><fdir1>1 0 0</fdir1>");

@@ -41,7 +41,7 @@ Vec3 place(const Sim& sim, const std::string& body) {
   return sim.state.bodies[sim.body(body)].translation;
 }
 
-TEST(Holds, WhatIsHeldFallsWhenItIsLetGo) {
+TEST(Holds, AHeldBodyFallsWhenReleased) {
   Sim sim(gantry(hold("box")) + box_sdf("box", "0.5 0 2 0 0 0", "0.2 0.2 0.2", 1.0), 1000);
   sim.run(2.0);
   EXPECT_NEAR(place(sim, "box/l").z(), 2.0, 1e-4);
@@ -52,7 +52,7 @@ TEST(Holds, WhatIsHeldFallsWhenItIsLetGo) {
   EXPECT_NEAR(place(sim, "box/l").x(), 0.5, 1e-4);
 }
 
-TEST(Holds, IsTakenAgainWhereItIs) {
+TEST(Holds, HoldsAgainAtTheCurrentPose) {
   Sim sim(gantry(hold("box")) + box_sdf("box", "0 0 2 0 0 0", "0.2 0.2 0.2", 1.0), 1000);
   tell(sim, "box", 0.0);
   sim.run(0.3);
@@ -76,7 +76,7 @@ TEST(Holds, MomentumIsShared) {
     EXPECT_NEAR(sim.state.body_twists[sim.body(body)].linear.x(), 0.5, 1e-3);
 }
 
-TEST(Holds, ARobotTakesWithItWhatItHolds) {
+TEST(Holds, ARobotCarriesItsHeldBody) {
   Sim sim(plane_sdf() +
           with(robot_sdf("r", "0 0 0 0 0 0", "<ruedo:watchdog>0</ruedo:watchdog>"), hold("box")) +
           box_sdf("box", "0.6 0 0.3 0 0 0", "0.2 0.2 0.2", 0.5));
@@ -91,7 +91,7 @@ TEST(Holds, ARobotTakesWithItWhatItHolds) {
   EXPECT_NEAR(place(sim, "box/l").z(), 0.1, 5e-3);  // it lies on the floor
 }
 
-TEST(Holds, WhoIsPutElsewhereTakesItAlong) {
+TEST(Holds, SetPoseMovesTheHeldBodyToo) {
   Sim sim(plane_sdf() + with(robot_sdf("r", "0 0 0 0 0 0"), hold("box")) +
           box_sdf("box", "0.6 0 0.3 0 0 0", "0.2 0.2 0.2", 0.5));
   sim.run(0.1);
@@ -106,7 +106,7 @@ TEST(Holds, WhoIsPutElsewhereTakesItAlong) {
   EXPECT_NEAR((place(sim, "box/l") - Vec3(0.6, 0.0, 0.3)).norm(), 0.0, 5e-3);
 }
 
-TEST(Holds, WhatIsLetGoLandsOnWhatHeldIt) {
+TEST(Holds, AReleasedBodyLandsOnItsHolder) {
   Sim sim(plane_sdf() +
           with(box_sdf("tray", "0 0 0.25 0 0 0", "1 1 0.5", 20.0), hold("box", "l", "l")) +
           box_sdf("box", "0.1 0 0.9 0 0 0", "0.2 0.2 0.2", 1.0));

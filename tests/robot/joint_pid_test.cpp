@@ -84,7 +84,7 @@ TEST(JointPid, IsStableAtStepsThatGazebosWouldNotBe) {
 }
 
 // It sags by m g l / p; the integral removes that, as far as its limits allow.
-TEST(JointPid, HoldsFromTheStartAndSagsByWhatTheIntegralLeaves) {
+TEST(JointPid, HoldsFromTheStartWithTheSagOfItsGains) {
   const auto sag = [](double p, double i, double most) {
     Machine lever(machine(plugin("JointPositionController",
                                  pid(p, i, 20.0) + gain("i_max", most) + gain("i_min", -most)),
@@ -144,7 +144,7 @@ TEST(JointPid, TheJointsOwnDampingActsBeside) {
   EXPECT_NEAR(machine.state.joint_efforts[0], 0.3 * machine.rate(), 1e-5);
 }
 
-TEST(JointPid, FrictionHoldsWhatTheEffortDoesNotOvercome) {
+TEST(JointPid, FrictionHoldsAgainstASmallerEffort) {
   const auto end = [](double p) {
     Machine machine(
         ::ruedo::robot::testing::machine(plugin("JointPositionController", pid(p, 0, 0.5)),
@@ -183,7 +183,7 @@ TEST(JointPid, AnExactControllerIsAsFastAsItsCommandMayBe) {
 }
 
 // The velocity gain brakes: it adds to d of the position's.
-TEST(JointPid, ATrajectorysTwoControllersAreOne) {
+TEST(JointPid, AddsTheVelocityGainToThePositionsD) {
   Machine machine(::ruedo::robot::testing::machine(plugin(
       "JointTrajectoryController", gain("position_p_gain", 10.0) + gain("position_d_gain", 0.4) +
                                        gain("velocity_p_gain", 0.6))));

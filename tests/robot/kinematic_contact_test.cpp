@@ -111,7 +111,7 @@ TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
 }
 
 // A velocity command stays active, and its status says that the robot is blocked, until it is not.
-TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
+TEST(KinematicContact, AWallBlocksAVelocity) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
   sim.velocity(0.5, 0.0);
@@ -176,7 +176,7 @@ TEST(KinematicContact, SidewaysIsAWayAsWell) {
 }
 
 // The robot rubs along a wall at its side all the way, and stops at a crate in the end.
-TEST(KinematicContact, WhatBlocksIsNamed) {
+TEST(KinematicContact, ReportsTheLinkThatBlocks) {
   for (const char* drive : {"kinematic", "wheels"}) {
     Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog, drive) +
             box_sdf("side", "1 0.3299 0.5 0 0 0", "6 0.2 1") +
@@ -192,7 +192,7 @@ TEST(KinematicContact, WhatBlocksIsNamed) {
   }
 }
 
-TEST(KinematicContact, WhatBlocksAPrimitiveIsNamedUntilTheNextCommand) {
+TEST(KinematicContact, ReportsTheLinkThatBlocksAPrimitiveUntilTheNextCommand) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0") + robot_sdf("s", "0 2 0 0 0 0") +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 6 1"));
   sim.move(Move::ADVANCE, 3.0);
@@ -230,7 +230,7 @@ TEST(KinematicContact, BackingOffAWallIsNotBlockedByIt) {
 }
 
 // It does not fit between two posts, and cannot turn there.
-TEST(KinematicContact, WhatBlocksATurnIsNamed) {
+TEST(KinematicContact, ReportsTheLinkThatBlocksATurn) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("post", "0.2 0.29 0.5 0 0 0", "0.1 0.1 1") +
           box_sdf("other", "-0.2 -0.29 0.5 0 0 0", "0.1 0.1 1"));
@@ -241,7 +241,7 @@ TEST(KinematicContact, WhatBlocksATurnIsNamed) {
 }
 
 // A slope that is too steep blocks like a wall.
-TEST(KinematicContact, ASlopeThatIsTooSteepIsNamed) {
+TEST(KinematicContact, ReportsASlopeThatIsTooSteep) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("ramp", "2.3 0 0.4 0 -0.9 0", "3 3 0.1"));
   sim.velocity(0.5, 0.0);

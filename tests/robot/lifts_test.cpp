@@ -117,7 +117,7 @@ TEST(Lifts, ServeCallsInTheirOrder) {
   EXPECT_THAT(opened, ::testing::ElementsAre(2, 1));
 }
 
-TEST(Lifts, RefuseWhatTheyDoNotHave) {
+TEST(Lifts, RefuseUnknownFloorsAndDoors) {
   Sim sim(elevator());
   const auto reason = [&](const std::string& name, int8_t mode, double value) {
     tell(sim, name, mode, value);
@@ -175,7 +175,7 @@ std::string rmf_door(const std::string& name, bool component) {
 }
 
 // A trapezoid: 1 m at 0.5 m/s and 0.5 m/s^2 takes 1 / 0.5 + 0.5 / 0.5 = 3 s.
-TEST(Doors, OfRmfOpenAndCloseAsTheyAreTold) {
+TEST(Doors, OfRmfFollowTheirCommands) {
   for (const bool component : {false, true}) {
     Sim sim(rmf_door("gate", component), 1000);
     EXPECT_TRUE(sim.world->findings.empty()) << sim.world->findings.front().text;
@@ -255,7 +255,7 @@ TEST(Lifts, OfGazeboClassicGoByFloors) {
   EXPECT_EQ(refusal(sim), Status::REASON_BAD_VALUE);
 }
 
-TEST(Lifts, WhatIsNotThereIsNamed) {
+TEST(Lifts, ReportMissingDoorsAndJoints) {
   Sim sim(rmf_door("gate", false) + "<model name='l'>" +
           box("platform", "0 5 0 0 0 0", "1 1 0.1", 10) +
           slider("cabin_joint", "world", "platform", "0 0 1", -10, 10) +

@@ -43,7 +43,7 @@ std::string world_of(const char* type) {
   return plane_sdf() + robot_sdf("rover", "0 0 0 0 0 0", "", type);
 }
 
-TEST(OwnDrive, OneThatCannotBeCopiedIsNamed) {
+TEST(OwnDrive, ReportsADriveThatCannotBeCopied) {
   Sim sim(world_of("test_growing")), other(world_of("test_growing"));
   sim.velocity(0.3, 0.0);
   sim.run(0.5);
@@ -60,7 +60,7 @@ TEST(OwnDrive, OneThatCannotBeCopiedIsNamed) {
   EXPECT_GT(sim.position().x(), before.x() + 0.1);
 }
 
-TEST(OwnDrive, WhatFollowsInACopyIsWhatFollows) {
+TEST(OwnDrive, ACopyContinuesEqually) {
   Sim sim(world_of("test_copied")), other(world_of("test_copied"));
   sim.velocity(0.3, 0.2);
   sim.run(0.5);

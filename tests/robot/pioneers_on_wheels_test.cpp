@@ -72,7 +72,7 @@ TEST_P(OnWheels, StandsUpright) {
 }
 
 // Includes the two cases of E1: measured at the moment of DONE, not a second later.
-TEST_P(OnWheels, IsOneMetreOnWhenItSaysDone) {
+TEST_P(OnWheels, AnAdvanceEndsOneMetreAhead) {
   Sim sim(plane_sdf() + robot("0 0 0 0 0 0.4"));
   sim.run(1.0);
   const Pose start = sim.robot().X_WBase;

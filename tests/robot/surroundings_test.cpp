@@ -15,7 +15,7 @@ std::string thing(const std::string& name, const std::string& pose, const std::s
          "</size></box></geometry></collision></link>" + more + "</model>";
 }
 
-TEST(Belt, CarriesWhatLiesOnIt) {  // turned by 90 degrees: its x is the world's y
+TEST(Belt, CarriesItsLoad) {  // turned by 90 degrees: its x is the world's y
   Sim sim(plane_sdf() +
           thing("belt", "0 0 0.25 0 0 1.5707963267948966", "6 1 0.5",
                 "<ruedo:belt><ruedo:velocity>0.4 0 0</ruedo:velocity></ruedo:belt>") +

@@ -47,7 +47,7 @@ Twist twist(const Sim& sim, const std::string& name) {
   return sim.state.body_twists.at(static_cast<size_t>(sim.body(name)));
 }
 
-TEST(Wind, PushesWhatFeelsIt) {
+TEST(Wind, PushesLinksWithWindEnabled) {
   Sim sim(kWind + plugin(kAtOnce) + floating("light", "0 0 5 0 0 0", kFeels) +
               floating("heavy", "0 5 5 0 0 0", kFeels, 50.0) + floating("other", "0 9 5 0 0 0", ""),
           1000);
@@ -80,7 +80,7 @@ TEST(Wind, RisesAsItsPluginSays) {
 }
 
 // In calm air the same law is drag: what falls comes to g / k.
-TEST(Wind, SlowsWhatFalls) {
+TEST(Wind, SlowsAFallingBody) {
   Sim sim(plugin("<force_approximation_scaling_factor>4</force_approximation_scaling_factor>") +
               floating("leaf", "0 0 50 0 0 0", kFeels, 0.01, true) +
               floating("stone", "0 5 50 0 0 0", "", 0.01, true),
@@ -94,7 +94,7 @@ TEST(Wind, SlowsWhatFalls) {
 
 // 10 kg with mu 0.5 hold 49 N: 6 m/s with a gain of 0.7 push 42 N, 8 m/s 56 N. The wind reaches 8
 // m/s long after everything has come to rest.
-TEST(Wind, MovesWhatStandsWhenItIsStrongEnough) {
+TEST(Wind, AStrongOneMovesAStandingBody) {
   const auto crate = [](const std::string& name, const std::string& pose) {
     std::string text = box_sdf(name, pose, "0.4 0.4 0.4", 10.0);
     return text.insert(text.find("<inertial>"), kFeels);
@@ -137,7 +137,7 @@ TEST(Wind, OfAModelAndOfOneLink) {
   EXPECT_NEAR(twist(sim, "one/a").angular.z(), 0.1 * 3 * 0.5 / 2.5, 0.1 * 0.6 * 0.1);
 }
 
-TEST(Wind, WithoutItsPluginPushesNothingAndIsNamed) {
+TEST(Wind, WithoutItsPluginPushesNothingAndWarns) {
   Sim sim(kWind + floating("kite", "0 0 5 0 0 0", kFeels), 1000);
   sim.run(0.5);
   EXPECT_EQ(position(sim, "kite/l").x(), 0.0);
@@ -178,7 +178,7 @@ TEST(Wind, ItsNoiseIsOfTheSeedAndTheFile) {
   EXPECT_NEAR(squares / kDraws, 1.0, 3.29 * std::sqrt(2.0 / kDraws));
 }
 
-TEST(Wind, WhatOfItIsNotSimulatedIsNamed) {
+TEST(Wind, WarnsAboutUnsupportedElements) {
   struct Case {
     const char* inside;
     const char* text;

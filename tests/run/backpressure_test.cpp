@@ -22,7 +22,7 @@ TEST(Backpressure, ReadsLinesOfThreeNumbers) {
     EXPECT_FALSE(read_launcher_progress(line)) << line;
 }
 
-TEST(Backpressure, LimitsNobodyBeforeTheFirstWord) {
+TEST(Backpressure, LimitsNothingBeforeTheFirstReport) {
   const Backpressure pressure(5'000);
   EXPECT_FALSE(pressure.acts());
   EXPECT_EQ(pressure.limits().at_any_rate, kFarAhead);
@@ -95,7 +95,7 @@ class Launched : public testing::Test {
   Controlled run_;
 };
 
-TEST_F(Launched, WaitsAndGoesOn) {
+TEST_F(Launched, WaitsAndContinues) {
   EXPECT_EQ(stands_at(), 30'000);
   note_progress({0, 30'000});
   EXPECT_EQ(stands_at(), 60'000);

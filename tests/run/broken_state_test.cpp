@@ -48,7 +48,7 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
 
 // The renderer is created again when a model comes or goes, which may fail the second time, and
 // again on the way back.
-TEST(BrokenState, NobodyGoesOnWithoutARenderer) {
+TEST(BrokenState, TheRunEndsWithoutARenderer) {
   engine::Channels channels;
   Findings findings;
   engine::Wakeup wakeup;

@@ -93,14 +93,14 @@ struct Alone {
   }
 };
 
-TEST(WhoLeaves, LeavesNothingThatWaitsForAStep) {
+TEST(LeavingClient, DropsRequestsThatWaitForAStep) {
   Alone alone;
   alone.come_and_go(100);
   alone.control.published(1000);
   EXPECT_EQ(alone.replies.size(), 0u);
 }
 
-TEST(WhoLeaves, LeavesNothingThatWaitsForTheFirstState) {
+TEST(LeavingClient, DropsRequestsThatWaitForTheFirstState) {
   Alone alone;
   alone.state_comes = true;
   alone.come_and_go(100);
@@ -109,7 +109,7 @@ TEST(WhoLeaves, LeavesNothingThatWaitsForTheFirstState) {
   EXPECT_EQ(alone.replies.size(), 0u);
 }
 
-TEST(WhoLeaves, IsAlsoWhoIsDropped) {
+TEST(LeavingClient, ADroppedClientCountsAsLeaving) {
   Alone alone;
   join_t body;
   body.client = "crashed";
@@ -198,7 +198,7 @@ TEST(Places, GoToNewcomersWithinSeconds) {
 }
 
 // A process that is stopped hears nobody, wherever the stop falls between two looks at the clock.
-TEST(Silence, IsNobodysWhileTheProcessCouldNotListen) {
+TEST(Silence, DoesNotCountWhileTheProcessIsStopped) {
   Sessions sessions;
   Session* session = sessions.join("patient", 1);
   const auto silence = [&] { return sessions.listened() - session->last_heard; };
@@ -229,7 +229,7 @@ grant_request_t grant(int64_t granted, int64_t until) {
 }
 
 // A rate that is too slow to wait for would stop the run of the clients that grant.
-TEST(InLockstep, NobodyElseSetsThePace) {
+TEST(InLockstep, RefusesARate) {
   Controlled client;
   client.begin(in_lockstep(), kRobot);
   EXPECT_EQ(client.ask(request_t::GRANT, engine::encoded(grant(-1, -1))).code, reply_t::OK);
@@ -242,7 +242,7 @@ TEST(InLockstep, NobodyElseSetsThePace) {
 
 // Before its first state a lockstep run refuses what is not possible yet, and still answers
 // everybody else.
-TEST(BeforeLockstep, NobodyIsHeldUp) {
+TEST(BeforeLockstep, AnswersWhileItsFirstStateIsMissing) {
   Controlled client;
   client.begin(in_lockstep(), kRobot);
   request_t strange = client.request(request_t::GET_STATE, engine::encoded(name_request_t{}));
@@ -264,7 +264,7 @@ TEST(BeforeLockstep, NobodyIsHeldUp) {
   EXPECT_EQ(client.ask(request_t::QUIT).code, reply_t::OK);
 }
 
-TEST(InLockstep, APauseIsWhatTheRunWaitsFor) {
+TEST(InLockstep, APauseStopsTheRunDespiteGrants) {
   Controlled client;
   client.begin(in_lockstep(), kRobot);
   ASSERT_EQ(client.ask(request_t::GRANT, engine::encoded(grant(-1, -1))).code, reply_t::OK);

@@ -102,7 +102,7 @@ TEST_F(EditsResetTest, AResetOfAllTakesGuestsAwayAndEqualsAFreshRun) {
   EXPECT_NEAR(state("box").position[0], 2.0, 1e-3);
 }
 
-TEST_F(EditsResetTest, TheLogHasWhatWasChangedAndWhen) {
+TEST_F(EditsResetTest, TheLogHoldsEachChangeWithItsStep) {
   const TemporaryFile log("edits.lcm");
   RunOptions options = paused_server();
   options.record = log.path();
@@ -178,7 +178,7 @@ TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
 
 // The robot that is waited for goes and comes back, and the time is reset meanwhile: the run goes
 // on, and no further than the messages allow while the robot is there.
-TEST_F(EditsResetTest, WhatIsWaitedForGoesAndComes) {
+TEST_F(EditsResetTest, WaitsForARobotThatIsRemovedAndRestored) {
   const TemporaryFile log("waits.lcm");
   RunOptions options = fast(1e6);
   options.wait_for = {{"r/velocity", {10, 1}}};  // each 20th step

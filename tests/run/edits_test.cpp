@@ -53,7 +53,7 @@ class Onlooker : public Sink {
   int headers_ = 0, changes_ = 0;
 };
 
-TEST_F(EditsTest, WhoOnlyLooksOnHearsOfAModelAndOfNoLog) {
+TEST_F(EditsTest, AnOnlookerSeesTheChangeAndNoLogHeader) {
   Onlooker onlooker;
   begin(paused_server(), robot_sdf("r", 0, 0), &onlooker);
   step(10);
@@ -103,7 +103,7 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
 }
 
 // The next robot of the same model takes the removed one's place in all lists.
-TEST_F(EditsTest, EachSpawnedRobotIsToldOfItsWatchdog) {
+TEST_F(EditsTest, EachSpawnedRobotReportsItsWatchdog) {
   std::ostringstream log;
   const auto former = spdlog::default_logger();
   spdlog::set_default_logger(std::make_shared<spdlog::logger>(
@@ -130,7 +130,7 @@ TEST_F(EditsTest, EachSpawnedRobotIsToldOfItsWatchdog) {
   EXPECT_EQ(told("second"), 1u) << log.str();
 }
 
-TEST_F(EditsTest, RaysMeetWhatCameAndNotWhatWent) {
+TEST_F(EditsTest, RaysHitSpawnedModelsAndNoRemovedOnes) {
   begin(paused_server(), robot_sdf("r", 0, 0, one_ray()));
   const auto range = [&] {
     const size_t from = bus.count();
@@ -174,7 +174,7 @@ TEST_F(EditsTest, ARemovedRobotIsSilentAndItsNameFree) {
   EXPECT_FALSE(on<pose_t>("s/pose", from).empty());
 }
 
-TEST_F(EditsTest, WhatStoodOnARemovedModelFalls) {
+TEST_F(EditsTest, ABodyOnARemovedModelFalls) {
   begin(paused_server(), box_sdf("table", "1 1 1", true, 0, 0, 0.5) +
                              box_sdf("cup", "0.2 0.2 0.2", false, 0, 0, 1.1) +
                              robot_sdf("r", 3, 0));
@@ -207,7 +207,7 @@ TEST_F(EditsTest, RefusesToPutItIntoSomething) {
 }
 
 // The world that SAVE writes has the names, and a world may not have all.
-TEST_F(EditsTest, ANameIsOneThatAWorldMayHave) {
+TEST_F(EditsTest, RefusesNamesThatAWorldFileCannotHave) {
   begin(paused_server(), robot_sdf("r", 0, 0));
   const std::string box = as_file(box_sdf("x", "0.2 0.2 0.2", true));
   double x = 2;
@@ -231,7 +231,7 @@ TEST_F(EditsTest, APathIsThatOfOneModel) {
 }
 
 // The folder of the world is not its clients' to know.
-TEST_F(EditsTest, AnErrorInATextIsToldWithoutAFolder) {
+TEST_F(EditsTest, AnErrorInATextShowsNoFolder) {
   begin(paused_server(), box_sdf("x", "0.2 0.2 0.2", true));
   const reply_t reply =
       spawn(as_file("<model name='b'><link name='y'/><ruedo:path><ruedo:waypoint>0 0 soon 0 0 0 0"
@@ -290,7 +290,7 @@ TEST_F(EditsTest, PushesThings) {
   EXPECT_EQ(set_twist("nobody", {1, 0, 0}).code, reply_t::UNKNOWN_NAME);
 }
 
-TEST_F(EditsTest, WhatStandsFastIsPutElsewhereToo) {
+TEST_F(EditsTest, SetPoseMovesStaticModelsToo) {
   const std::string arm =
       "<model name='arm'><pose>0 5 0 0 0 0</pose><link name='l'><inertial><mass>1</mass></inertial>"
       "</link><joint name='j' type='fixed'><parent>world</parent><child>l</child></joint></model>";

@@ -161,7 +161,7 @@ TEST(Engine, ACopyThatIsResetIsAFreshOne) {
 }
 
 // tests/engine/test_snapshots.py compares the bytes of other worlds and devices.
-TEST(Engine, ASavedWorldGoesOnAsItWentOn) {
+TEST(Engine, ARestoredWorldContinuesEqually) {
   for (unsigned seed = 1; seed < 5; ++seed) {
     std::mt19937 random(seed);
     const auto world = load_text(random_models(random, 2));
@@ -192,7 +192,7 @@ TEST(Engine, ASavedWorldGoesOnAsItWentOn) {
 }
 
 // Sensors that do not define it: Noise of test_determinism.cpp.
-TEST(Engine, ASensorThatCannotBeCopiedIsNamed) {
+TEST(Engine, ReportsASensorThatCannotBeCopied) {
   Engine engine(load_text(robot_sdf("a", 0, 0, "<sensor name='S' type='test_noise'/>")), {});
   engine.step(10);
   const uint64_t before = engine.state_hash(0);
@@ -238,7 +238,7 @@ TEST(Engine, ArraysFollowTheRuns) {
 
 // A faulty <sensor> costs only that sensor, and is reported; the rest of the world runs. A faulty
 // element of Ruedo's own is an error.
-TEST(Engine, GoesOnWithoutASensorThatIsWrittenWrongly) {
+TEST(Engine, ContinuesWithoutAMalformedSensor) {
   const std::string wrong =
       "<sensor name='laser' type='ray'><ray><scan><horizontal><samples>-3</samples></horizontal>"
       "</scan><range><min>1</min><max>2</max></range></ray></sensor>"
@@ -367,7 +367,7 @@ TEST(Engine, SurvivesEveryFailingAllocation) {
   }
 }
 
-TEST(Engine, SaysWhatCannotBe) {
+TEST(Engine, ReportsInvalidArguments) {
   engine::EngineOptions options;
   Engine engine(load_text(robot_sdf("a", 0, 0)), options);
   const auto message = [](const auto& call) {

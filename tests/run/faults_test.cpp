@@ -63,7 +63,7 @@ std::vector<int> pass(FaultFilter& filter, const std::vector<SensorFault>& fault
   return steps;
 }
 
-TEST(FaultsKeep, NoMoreMessagesThatLagThanThereIsRoomFor) {
+TEST(FaultsKeep, NoMoreLaggingMessagesThanFit) {
   FaultFilter filter(5000, 3 * kCost);
   const std::vector<SensorFault> faults{fault(Kind::lag, 1, 0, 1000)};
   for (int64_t step = 0; step < 20; ++step) EXPECT_THAT(pass(filter, faults, step), IsEmpty());
@@ -234,7 +234,7 @@ TEST_F(FaultsTest, OtherSeedsMakeRoomWhenTheyHaveActed) {
   }
 }
 
-TEST_F(FaultsTest, ThoseThatActAtOnceAreBounded) {
+TEST_F(FaultsTest, LimitsSimultaneousFaults) {
   const world::Fault weak = made("weak_motor", "", 0.0, 0.5),
                      dropout = made("dropout", "odometry", 1e6, 0.0);
   for (int i = 0; i < 500; ++i) {
@@ -266,7 +266,7 @@ TEST_F(FaultsTest, NoNumberOfAMessageEndsTheRun) {
   EXPECT_NO_THROW(robots_.step());
 }
 
-TEST_F(FaultsTest, WhatTakesNoValueGetsNone) {
+TEST_F(FaultsTest, RefusesAValueWhereNoneIsAllowed) {
   EXPECT_TRUE(takes(made("freeze", "odometry", 0.0, 0.0)));
   EXPECT_EQ(faults_.check(made("freeze", "odometry", 0.0, 2.5), RobotIndex(0)),
             "value 2.5 of freeze is not allowed; it takes none");

@@ -51,7 +51,7 @@ TEST_F(Features, OfLockstep) {
   EXPECT_TRUE(served_ >> request_t::RESEND & 1);
 }
 
-TEST_F(Features, OfOneThatSavesSnapshots) {
+TEST_F(Features, WithSnapshots) {
   RunOptions options = paused_server();
   options.snapshots =
       std::filesystem::temp_directory_path().string();  // nothing is saved: the name is missing

@@ -77,7 +77,7 @@ TEST_F(InboxTest, BeforeLiveOnesInTheOrderOfScheduling) {
   EXPECT_THAT(apply(0), ElementsAre(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0, 2.0));
 }
 
-TEST_F(InboxTest, RefusesWhatIsLateOrFaulty) {
+TEST_F(InboxTest, RefusesLateAndMalformedCommands) {
   apply(0);
   apply(1);
   EXPECT_EQ(schedule(1, 0.1), Scheduled::late);
@@ -115,7 +115,7 @@ TEST_F(InboxTest, TakesNothingLarge) {
   }
 }
 
-TEST_F(InboxTest, WhatWaitsForARobotGoesWithIt) {
+TEST_F(InboxTest, RemovingARobotDropsItsCommands) {
   EXPECT_EQ(schedule(3, 0.3), Scheduled::kept);
   receive(0.1);
   inbox_.remove(RobotIndex(0));
@@ -123,7 +123,7 @@ TEST_F(InboxTest, WhatWaitsForARobotGoesWithIt) {
 }
 
 // However threads are scheduled, each kept command acts once, on its step.
-TEST_F(InboxTest, APrimitiveThatIsSentAgainIsTakenOnce) {
+TEST_F(InboxTest, ARepeatedPrimitiveRunsOnce) {
   engine::CommandInbox inbox({{"r/move", RobotIndex(0), engine::Input::Kind::move}}, 1);
   const auto moved = [&](int64_t id, double value) {
     move_command_t command{};

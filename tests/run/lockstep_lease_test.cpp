@@ -141,7 +141,7 @@ class LockstepTest : public testing::Test {
   Stepping stepping(*this, a, 10);                 \
   b.step(3);
 
-TEST_F(LockstepTest, PausesForASilentClientAndGoesOnWithIt) {
+TEST_F(LockstepTest, PausesForASilentClientAndContinuesWithIt) {
   with_leases(2, Policy::pause, 0.3, [&](double) {
     TWO_CLIENTS
     // While the lease lasts nobody else can take its name; after it has ended somebody may, and
@@ -189,7 +189,7 @@ TEST_F(LockstepTest, DropsASilentClient) {
 
 // The server is held up while it answers, for longer than the lease: after it heard the client and
 // before it looks at the leases.
-TEST_F(LockstepTest, BlamesNobodyWhileItIsHeldUpItself) {
+TEST_F(LockstepTest, BlamesNoClientWhileItsProcessIsStopped) {
   with_leases(1, Policy::fail, 1.1, [&](double lease_s) {
     LockstepClient a = client("a");
     a.take_part();
@@ -279,7 +279,7 @@ class HostileGrants : public LockstepTest {
   std::string text_;
 };
 
-TEST_F(HostileGrants, AreRefusedWithWhatIsWrong) {
+TEST_F(HostileGrants, AreRefusedWithAReason) {
   const std::vector<uint8_t> good = velocity(0.1);
   const struct {
     const char* what;
@@ -410,7 +410,7 @@ TEST_F(HostileGrants, AllAtOnceGoesAsFarAsIsKept) {
 }
 
 // If fragments are lost, LCM may reassemble a fragmented message wrongly.
-TEST_F(HostileGrants, AReplyIsOneDatagram) {
+TEST_F(HostileGrants, AReplyFitsIntoOneDatagram) {
   client_->send(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(4, 5, 4)));
   while (newest(*client_, 4) < 5) {
   }

@@ -29,7 +29,7 @@ markers_t layer_with(marker_t marker) {
   return markers;
 }
 
-TEST(Markers, WholeOnesAreTaken) {
+TEST(Markers, AcceptsCompleteMarkers) {
   marker_t path = marker_of(marker_t::PATH);
   path.n = 2;
   path.points = {{0, 0, 0}, {1, 0, 0}};
@@ -45,7 +45,7 @@ TEST(Markers, WholeOnesAreTaken) {
   EXPECT_EQ(check_markers(none), "");
 }
 
-TEST(Markers, EachFaultIsNamed) {
+TEST(Markers, ReportsEachFault) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   struct Case {
     std::function<void(markers_t&)> spoil;
@@ -103,7 +103,7 @@ std::vector<uint8_t> bytes_of(const markers_t& markers) {
   return bytes;
 }
 
-TEST(Markers, TheInboxTakesWholeOnesAlone) {
+TEST(Markers, TheInboxAcceptsOnlyCompleteMarkers) {
   CommandInbox inbox({{"ruedo/markers", RobotIndex(), Input::Kind::markers}}, 0);
   markers_t markers = layer_with(marker_of(marker_t::POINTS));
   const auto good = bytes_of(markers);

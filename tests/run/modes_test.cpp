@@ -80,7 +80,7 @@ std::vector<uint8_t> forward() {
   return engine::encoded(command);
 }
 
-TEST(Live, GoesOnByItself) {
+TEST(Live, RunsByItself) {
   FakeWorld world;
   Live live({}, kStep_us);
   live.begin(world.stage(), -1);
@@ -138,7 +138,7 @@ TEST(Live, CountsOnForARobotThatStays) {
 }
 
 // As after a RESET of the time, or a RESTORE.
-TEST(Live, GoesOnInAWorldWithoutTheRobot) {
+TEST(Live, RunsInAWorldWithoutTheRobot) {
   FakeWorld world;
   Live live({{"r/velocity", {10, 1}}}, kStep_us);
   live.begin(world.stage(), -1);
@@ -147,7 +147,7 @@ TEST(Live, GoesOnInAWorldWithoutTheRobot) {
   EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
 }
 
-TEST(Live, RefusesToWaitForWhatIsNoInput) {
+TEST(Live, RefusesToWaitForAChannelThatIsNotAnInput) {
   FakeWorld world;
   Live live({{"r/velocty", {10, 1}}}, kStep_us);
   EXPECT_THROW(live.begin(world.stage(), -1), InputError);
@@ -239,7 +239,7 @@ TEST_F(LockstepModeTest, GoesToTheSmallestGrant) {
   EXPECT_EQ(world_.gate.limit, 10);
 }
 
-TEST_F(LockstepModeTest, WhoJoinsStandsWhereTheRunIsAllowedToGo) {
+TEST_F(LockstepModeTest, AJoiningClientStartsAtTheGrantedStep) {
   begin(1);
   join_all();
   sessions_.push_back({});
@@ -271,7 +271,7 @@ TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {
   EXPECT_EQ(grant(0, 0, 3).code, reply_t::OK);  // grants stand at 0 again
 }
 
-TEST_F(LockstepModeTest, ANameIsTakenUntilItsClientIsSilent) {
+TEST_F(LockstepModeTest, AClientsNameIsReservedUntilItIsSilent) {
   begin(1);
   join_all();
   publish(0);
@@ -390,7 +390,7 @@ TEST_F(LockstepModeTest, HasNoRoomBeforeTheMessagesAreReceived) {
   EXPECT_EQ(world_.gate.limit, most - 1 + Lockstep::kMostAhead);
 }
 
-TEST_F(LockstepModeTest, WaitsForTheSilentOrGoesOnOrFails) {
+TEST_F(LockstepModeTest, WaitsForASilentClientOrContinuesOrFails) {
   using Policy = LockstepOptions::Policy;
   for (const Policy policy : {Policy::pause, Policy::drop, Policy::fail}) {
     sessions_.clear();

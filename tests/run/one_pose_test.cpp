@@ -183,7 +183,7 @@ std::map<std::string, std::string> robots() {
   return files;
 }
 
-TEST(OnePose, IsThatOfBaseLinkForAllWhoTell) {
+TEST(OnePose, AllChannelsGiveThePoseOfBaseLink) {
   int kinematic = 0, wheels = 0;
   world::LoadOptions load;
   load.allow_absolute = true;

@@ -185,7 +185,7 @@ class RestoreTest : public testing::Test, protected Controlled {
   std::atomic<int> batches_{0};
 };
 
-TEST_F(RestoreTest, WhatFollowsIsWhatFollowed) {
+TEST_F(RestoreTest, ARestoredRunContinuesEqually) {
   start_paused();
   step(400);  // against the box
   saved_ = save("here");
@@ -248,7 +248,7 @@ TEST_F(RestoreTest, ALogOfARunThatBeganWithASnapshotHasThePastToo) {
   EXPECT_EQ(go_on(), later);
 }
 
-TEST_F(RestoreTest, ALinkToItselfIsNoSnapshot) {
+TEST_F(RestoreTest, RefusesALinkToItself) {
   start_paused();
   step(10);
   saved_ = save("here");
@@ -303,7 +303,7 @@ TEST_F(RestoreTest, TheFileOfAStateThatWasPutBackLeadsThere) {
   EXPECT_EQ(go_on(), followed);
 }
 
-TEST_F(RestoreTest, WhatWasNotAppliedYetIsNotSaved) {
+TEST_F(RestoreTest, DoesNotSavePendingCommands) {
   start_paused();
   step(100);
   velocity_command_t command{};
@@ -325,7 +325,7 @@ TEST_F(RestoreTest, WhatWasNotAppliedYetIsNotSaved) {
   EXPECT_EQ(go_on(), followed);
 }
 
-TEST_F(RestoreTest, OneWhoseWorldWasEditedRunsThePastAgain) {
+TEST_F(RestoreTest, ResimulatesAnEditedWorld) {
   start_paused();
   step(200);
   ASSERT_EQ(spawn(as_file(box_sdf("b", "0.2 0.2 0.2", false)), 2, 2, "b").code, reply_t::OK);
@@ -350,7 +350,7 @@ TEST_F(RestoreTest, ARefusedRequestCostsNoState) {
   EXPECT_EQ(go_on(), followed);
 }
 
-TEST_F(RestoreTest, AndSoDoesOneWhoseRunIsLogged) {
+TEST_F(RestoreTest, ResimulatesALoggedRun) {
   RunOptions options = paused_server();
   options.record = folder_ + "/restored.lcm";
   start_paused(options);
@@ -421,7 +421,7 @@ TEST_F(RestoreTest, APauseEndsTheWayToAStateThatIsFarAway) {
   EXPECT_EQ(step(3).step, there.step + 3) << "the run goes on from there";
 }
 
-TEST_F(RestoreTest, WhatIsTooFarOrBreaksOffIsRefusedBeforeAnythingChanges) {
+TEST_F(RestoreTest, RefusesUnreachableStatesBeforeAnythingChanges) {
   TemporaryFile log("refused.lcm");
   RunOptions options = paused_server();
   options.record = log.path();

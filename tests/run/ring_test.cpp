@@ -78,7 +78,7 @@ void write_steps(Ring& ring, int first, int count) {
   ring.flush();
 }
 
-TEST_F(RingTest, KeepsWhatActedAndTheLastOfTheRest) {
+TEST_F(RingTest, KeepsInputsAndTheLatestMessages) {
   const std::vector<uint8_t> header(100), spawn = applied(request_t::SPAWN);
   {
     Ring ring(path("run.lcm"), kLimit);
@@ -114,7 +114,7 @@ TEST_F(RingTest, KeepsWhatActedAndTheLastOfTheRest) {
   EXPECT_EQ(next, 1000);
 }
 
-TEST_F(RingTest, StopsKeepingWhatActedAtHalfOfTheLimit) {
+TEST_F(RingTest, StopsKeepingInputsAtHalfOfTheLimit) {
   Ring ring(path("run.lcm"), kLimit);
   const std::vector<uint8_t> record(1000);
   for (int step = 0; step < 1000; ++step) {
@@ -127,7 +127,7 @@ TEST_F(RingTest, StopsKeepingWhatActedAtHalfOfTheLimit) {
   EXPECT_LE(bytes(), kLimit + 1100);
 }
 
-TEST_F(RingTest, WhatChangedTheWorldMayBeAnything) {
+TEST_F(RingTest, KeepsLargeWorldChanges) {
   Ring ring(path("run.lcm"), kLimit);
   const std::vector<uint8_t> header(20'000), half(1000);
   ring.write(0, kHeaderChannel, header.data(), header.size(), true);
@@ -172,7 +172,7 @@ TEST_F(RingTest, ReplacesTheFilesOfAnEarlierRunAndNoOthers) {
                                                "runs.000001.lcm"));
 }
 
-TEST_F(RingTest, TheRunIsRepeatedFromWhatActed) {
+TEST_F(RingTest, RepeatsTheRunFromItsInputs) {
   const auto world = load_text(robot_sdf("r", 0, 0));
   {
     run::RunOptions options = fast(2);

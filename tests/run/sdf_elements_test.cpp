@@ -7,7 +7,7 @@
 namespace ruedo {
 namespace {
 
-TEST(SdfElements, NoneOfASensorIsSilent) {
+TEST(SdfElements, EveryElementOfASensorActsOrIsReported) {
   const auto of_sensors = [](const std::string& path) {
     return path.find("/sensor") != std::string::npos;
   };
@@ -25,7 +25,7 @@ TEST(SdfElements, NoneOfASensorIsSilent) {
 }
 
 // Reported when the file is read, or when the device is created, but not twice.
-TEST(SdfElements, AnUnknownOneInASensorIsNamedOnce) {
+TEST(SdfElements, ReportsAnUnknownElementOfASensorOnce) {
   const auto count = [](const std::string& text, const std::string& word) {
     const auto world = world::load_world_text(text, "/nowhere/w.sdf");
     engine::Channels channels;

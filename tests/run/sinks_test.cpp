@@ -93,7 +93,7 @@ TEST(QueuedSink, WaitsWhereNothingMayBeMissing) {
   EXPECT_EQ(notes.lines().size(), 303u);  // what is in the queue at its end is handed on
 }
 
-TEST(QueuedSink, MissesWholeStepsRatherThanWaiting) {
+TEST(QueuedSink, DropsWholeStepsInsteadOfWaiting) {
   Notes notes;
   notes.hold();
   QueuedSink queue(notes, {.thread = "notes", .most_bytes = 10'000});

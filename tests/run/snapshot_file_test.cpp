@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 namespace ruedo::run {
 namespace {
 
-TEST(SnapshotFile, OneThatFailsLeavesNothing) {
+TEST(SnapshotFile, AFailedWriteLeavesNoFile) {
   std::string folder = (fs::temp_directory_path() / "ruedo-snapshots-XXXXXX").string();
   ASSERT_NE(::mkdtemp(folder.data()), nullptr);
   {

@@ -30,7 +30,7 @@ struct Gate {
   }
 };
 
-TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
+TEST(SpawnWorker, TheRunAndOthersContinueMeanwhile) {
   Gate gate;
   TemporaryFile log("spawned.lcm");
   Controlled client;
@@ -68,7 +68,7 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
   EXPECT_EQ(verdict.fault, "");
 }
 
-TEST(SpawnWorker, AResetEndsWhatIsNotReady) {
+TEST(SpawnWorker, AResetCancelsUnfinishedModels) {
   Gate gate;
   Controlled client;
   RunOptions options = paused_server();
@@ -112,7 +112,7 @@ TEST(SpawnWorker, OneIsReadyAtATime) {
   EXPECT_EQ(taken_before, (std::vector<int>{0, 1, 2}));
 }
 
-TEST(SpawnWorker, WhoLeavesGetsNoModel) {
+TEST(SpawnWorker, ALeavingClientGetsNoModel) {
   Gate gate;
   int made = 0;
   Controlled client;

@@ -25,7 +25,7 @@ using testing::HasSubstr;
 
 const StallWatch::Clock::time_point kStart = StallWatch::Clock::now();
 
-TEST(StallWatch, TellsOnceWhoIsWaitedFor) {
+TEST(StallWatch, ReportsOnceWhatTheRunWaitsFor) {
   std::vector<std::string> told;
   {
     StallWatch watch({.tell = [&](const std::string& reason) { told.push_back(reason); },
@@ -77,7 +77,7 @@ class Told {
   std::string slow_;
 };
 
-TEST(StallWatch, TellsWhichRequestHoldsThePublisherUp) {
+TEST(StallWatch, ReportsTheRequestThatDelaysThePublisher) {
   Told told;
   StallWatch watch({.tell = [&](const std::string& reason) { told.tell(reason); },
                     .takes_none = [] { return std::string("the bus"); }});
@@ -86,7 +86,7 @@ TEST(StallWatch, TellsWhichRequestHoldsThePublisherUp) {
 }
 
 // Standard error may be a pipe that nobody reads.
-TEST(StallWatch, ARunGoesOnWhileNobodyTakesWhatIsTold) {
+TEST(StallWatch, ARunContinuesIfNobodyReadsItsWarnings) {
   std::counting_semaphore begun(0), taken(0);
   StallWatch watch({.tell =
                         [&](const std::string&) {
@@ -192,7 +192,7 @@ TEST(StallWatch, NamesTheDisk) {
   EXPECT_THAT(reason_with_a_full_pipe(1000, 1), names_it) << "the run has ended";
 }
 
-TEST(StallWatch, APausedOrSlowRunIsNotHeldUp) {
+TEST(StallWatch, APausedOrSlowRunIsNotStalled) {
   Pacer pacer(5000, 0.001, 1000);  // a step takes 5 s
   EXPECT_FALSE(pacer.rests());     // step 0 is due
   int64_t step = -1;

@@ -167,7 +167,7 @@ TEST_F(ControlTest, ResetEqualsAFreshRun) {
   EXPECT_EQ(first.state_hash, second.state_hash);
 }
 
-TEST_F(ControlTest, InfoTellsAllThereIs) {
+TEST_F(ControlTest, InfoDescribesTheWholeRun) {
   begin(paused());
   size_t from = 0;
   const auto info = decoded<world_info_t>(bus_.wait_for("ruedo/info", from).bytes);

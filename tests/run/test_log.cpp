@@ -73,7 +73,7 @@ TEST(Writer, TwoDoNotWriteIntoOneFile) {
   EXPECT_NO_THROW(log::Writer{file.path()});  // whose writer has ended
 }
 
-TEST(Writer, AFullDiskIsSaid) {
+TEST(Writer, ReportsAFullDisk) {
   log::Writer log("/dev/full");
   const uint8_t bytes[1000] = {};
   log.write(0, "channel", bytes, sizeof bytes);
@@ -130,7 +130,7 @@ TEST(Recording, AFullDiskEndsTheRun) {
   }
 }
 
-TEST(Recording, HoldsWhatARepetitionNeeds) {
+TEST(Recording, HoldsTheInputsOfARepetition) {
   const TemporaryFile file("run.lcmlog");
   RunOptions options = fast(1.0, 42);
   options.record = file.path();

@@ -54,7 +54,7 @@ std::vector<int64_t> times(MemoryBus& bus, const std::string& channel) {
   return found;
 }
 
-TEST(UnreadPictures, WhoComesLaterReadsWhatAllOthersWouldHaveRead) {
+TEST(UnreadPictures, ALateReaderGetsTheSamePictures) {
   MemoryBus everything;
   run::Run(load_text(robot_sdf("r", 0, 0, kEye)), fast(3.0), everything).run();
   HeardBus bus;
@@ -90,7 +90,7 @@ TEST(UnreadPictures, ALogHasAll) {
 }
 
 // A client that subscribes before a STEP or a RESET gets its pictures.
-TEST(UnreadPictures, AStepIsForThoseWhoListen) {
+TEST(UnreadPictures, AStepDrawsForItsSubscribers) {
   ControlledOn<HeardBus> server;
   RunOptions options = fast(1e9);
   options.paused = true;

@@ -34,7 +34,7 @@ std::string walls(double floor) {
          box("w3", "0 5 " + z, "10 0.2 3") + box("w4", "0 -5 " + z, "10 0.2 3");
 }
 
-TEST(Overview, WhatLiesFarOutsideDoesNotCount) {
+TEST(Overview, IgnoresThingsFarOutside) {
   for (const char* far : {"343582 0 0", "0 -343582 0", "1 1 343582", "0 0 -9000"}) {
     const Overview seen = overview_of(walls(0.0) + box("ball", far, "0.1 0.1 0.1"));
     EXPECT_LT((seen.shown.high - seen.shown.low).maxCoeff(), 10.3) << far;
@@ -42,7 +42,7 @@ TEST(Overview, WhatLiesFarOutsideDoesNotCount) {
   }
 }
 
-TEST(Overview, WhatStandsBesideTheRestCounts) {
+TEST(Overview, IncludesThingsBesideTheRest) {
   const Overview seen =
       overview_of(box("house", "0 0 2", "6 6 4") + box("letters", "12 0 0.5", "0.2 0.2 1"));
   EXPECT_NEAR(seen.shown.high.x(), 12.1, 1e-9);
@@ -55,7 +55,7 @@ TEST(Overview, AllRobotsCount) {
   EXPECT_GT(overview_of(content).shown.high.x(), 1200.0);
 }
 
-TEST(Overview, AFloorCountsUnlessItIsMuchLargerThanWhatStandsOnIt) {
+TEST(Overview, IncludesAFloorUnlessItIsMuchLargerThanItsContents) {
   EXPECT_NEAR(overview_of(walls(0.0) + box("yard", "0 0 -0.01", "30 30 0.02")).shown.high.x(), 15.0,
               1e-9);
   EXPECT_NEAR(overview_of(walls(0.0) + box("yard", "0 0 -0.01", "900 900 0.02")).shown.high.x(),
@@ -64,7 +64,7 @@ TEST(Overview, AFloorCountsUnlessItIsMuchLargerThanWhatStandsOnIt) {
 }
 
 // A room whose roof is cut off 2 m above its floor, also over a cellar, and on an upper floor.
-TEST(Overview, TheFloorIsWhatRobotsStandOn) {
+TEST(Overview, TheFloorIsBelowTheRobots) {
   const auto room = [](double floor, const std::string& more) {
     const auto at = [&](double z) { return "0 0 " + std::to_string(floor + z); };
     return overview_of(walls(floor) + box("floor", at(-0.05), "10 10 0.1") +
@@ -82,7 +82,7 @@ TEST(Overview, TheFloorIsWhatRobotsStandOn) {
 }
 
 // As gz-sim's contact_sensor.sdf: a ball that falls from 3 m over the ground covers all of itself.
-TEST(Overview, WhatMovesIsNoRoof) {
+TEST(Overview, AMovingBodyIsNotARoof) {
   const std::string ground =
       "<model name='g'><static>true</static><link name='l'><visual name='v'><geometry><plane>"
       "<normal>0 0 1</normal><size>100 100</size></plane></geometry></visual></link></model>";

@@ -44,7 +44,7 @@ struct Both {
   }
 };
 
-TEST(RayGrid, HitsWhatItsTrianglesHit) {
+TEST(RayGrid, HitsLikeItsTriangles) {
   RandomStream random = RandomSource(5, "rays", "grid").stream(0);
   const std::pair<size_t, size_t> sizes[] = {{2, 2}, {2, 9}, {6, 5}, {17, 33}, {70, 13}};
   for (const auto& [columns, rows] : sizes) {

@@ -132,7 +132,7 @@ TEST(RayMesh, BoxOfTrianglesIsABox) {
   }
 }
 
-TEST(RayMesh, DegenerateTrianglesAreNoTrouble) {
+TEST(RayMesh, IgnoresDegenerateTriangles) {
   auto mesh = opened(*cube_mesh());
   mesh->positions.push_back({3, 0, 0});
   mesh->triangles.push_back({8, 8, 8});

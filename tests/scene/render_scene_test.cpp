@@ -486,7 +486,7 @@ struct Sequence {
   }
 };
 
-TEST(RenderScene, WhatWasDrawnBeforeDoesNotShow) {
+TEST(RenderScene, APictureShowsNothingOfTheOneBefore) {
   const Sequence s;
   const world::BodyLayout layout(s.w.world);
   const auto used = make_renderer(s.w.world, layout);
@@ -604,7 +604,7 @@ TEST(RenderScene, BothBackendsDrawTheSame) {
   EXPECT_EQ(pictures[0].depth, pictures[1].depth);
 }
 
-TEST(RenderScene, AnUnknownBackendIsNamed) {
+TEST(RenderScene, RejectsAnUnknownBackend) {
   setenv("RUEDO_RENDERER", "vulkan", 1);
   const World w;
   const world::BodyLayout layout(w.world);

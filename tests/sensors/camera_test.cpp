@@ -262,7 +262,7 @@ TEST(Camera, DepthOfAWallAndOfTheFloor) {
   EXPECT_EQ(Shot(world_with(floor)).channel("/depth"), -1);
 }
 
-TEST(Camera, AFormatThatIsNotGivenIsNamed) {
+TEST(Camera, WarnsAboutAnUnsupportedFormat) {
   const auto named = [](const std::string& type, const std::string& format) {
     std::string sdf = world_with("", "", "", type);
     sdf.replace(sdf.find("</image>"), 8, "<format>" + format + "</format></image>");
@@ -500,7 +500,7 @@ TEST(Camera, ThingsAreSeenWhereTheLensBendsThem) {
   }
 }
 
-TEST(Camera, RefusesWhatItCannotBe) {
+TEST(Camera, RefusesInvalidElements) {
   struct Case {
     const char *in_camera, *in_sensor, *says;
   };

@@ -70,7 +70,7 @@ void expect(const force_torque_t& m, const Vec3& force, const Vec3& torque) {
 
 // The child hangs 3 kg on its parent: 3 g down, and about the shoulder 2 g 0.5 + 1 g 1 about y,
 // nose down.
-TEST(ForceTorque, AtRestItCarriesWhatHangsOnIt) {
+TEST(ForceTorque, AtRestItMeasuresTheHangingWeight) {
   for (const char* type : {"revolute", "fixed"}) {
     for (const char* hand : {"fixed", "revolute"}) {
       Bench bench(rig("", type, hand));
@@ -150,7 +150,7 @@ TEST(ForceTorque, WeighsTheSideThatIsFree) {
   expect(bench.samples().at(0), {0, 0, 2 * kG}, {0, -kG, 0});
 }
 
-TEST(ForceTorque, ALoopOrTwoHeldSidesHaveNoValueAndAreNamed) {
+TEST(ForceTorque, WarnsAboutLoopsAndTwoHeldSides) {
   const std::string two = "<sdf version='1.9'><world name='w'><model name='rig'>" +
                           link("a", 1, "0 0 0 0 0 0") + link("b", 1, "0 0 1 0 0 0");
   Bench held(two + joint("j", "fixed", "a", "b", sensor("")) +

@@ -188,7 +188,7 @@ TEST(NavSat, BiasAndPrecisionAreThoseOfTheFormat) {
   EXPECT_NEAR(m.altitude, 3.0 + 3.0, 1e-8);  // 3 m above the ground
 }
 
-TEST(NavSat, WithoutAPlaceItIsSaidWhereTheWorldLies) {
+TEST(NavSat, WithoutCoordinatesTheFindingGivesTheOrigin) {
   Bench<navsat_t> bench(world("navsat"));
   ASSERT_EQ(bench.bench.findings.list().size(), 1u);
   EXPECT_THAT(bench.bench.findings.list()[0].text, HasSubstr("no <spherical_coordinates>"));
@@ -303,7 +303,7 @@ TEST(Air, IsThatOfTheWorld) {
               expected, 1e-9 * expected);
 }
 
-TEST(AirSpeed, CountsWhatComesAlongItsAxis) {
+TEST(AirSpeed, MeasuresTheFlowAlongItsAxis) {
   Bench<air_speed_t> bench(world("air_speed", "", "", "0 0 0 0 0 1.5707963267948966"));
   bench.at({0, 0, 0});
   bench.now.body_twists[0].linear = {7, 20, 3};  // it looks along y
@@ -347,7 +347,7 @@ TEST(Instruments, RefusedConfigurations) {
   }
 }
 
-TEST(Instruments, WhatDoesNotActIsNamed) {
+TEST(Instruments, ReportElementsWithoutEffect) {
   for (const auto& [type, inside, named] :
        {std::tuple{"altimeter", "<altimeter><vertical_postion/></altimeter>",
                    "<vertical_postion> is not known and left out; did you mean "

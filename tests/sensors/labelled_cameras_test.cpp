@@ -205,7 +205,7 @@ TEST(ThermalCamera, NoiseIsInKelvin) {
   EXPECT_NEAR(squares / 20000, 1.0, 3.29 * std::sqrt(2.0 / 20000));
 }
 
-TEST(ThermalCamera, AHeatSignatureIsItsMeanAndNamed) {
+TEST(ThermalCamera, UsesTheMeanOfAHeatSignatureAndWarns) {
   SensorBench bench(world("thermal", "", "",
                           box("crate", "5 0 1 0 0 0", "1 1 1",
                               thermal("<heat_signature>heat.png</heat_signature><min_temp>290"
@@ -217,7 +217,7 @@ TEST(ThermalCamera, AHeatSignatureIsItsMeanAndNamed) {
 
 // Half the width of 2 m at 2 m is 1 m to each side, half of it upwards: the crate lies within, the
 // other one does not, nor what is too far or too near.
-TEST(LogicalCamera, ListsWhatHasItsOriginInTheFrustum) {
+TEST(LogicalCamera, ListsModelsWithTheirOriginInTheFrustum) {
   const std::string view =
       "<logical_camera><near>1</near><far>6</far><horizontal_fov>1.0</horizontal_fov>"
       "<aspect_ratio>2</aspect_ratio></logical_camera>";
@@ -237,7 +237,7 @@ TEST(LogicalCamera, ListsWhatHasItsOriginInTheFrustum) {
   EXPECT_NEAR(seen.objects.at(2).orientation[3], std::sin(0.25), 1e-15);
 }
 
-TEST(LabelledCameras, WhatDoesNotActIsNamed) {
+TEST(LabelledCameras, ReportElementsWithoutEffect) {
   struct Case {
     const char* type;
     const char* in_camera;

@@ -380,7 +380,7 @@ struct Refused {
   const char* message;
 };
 
-TEST(Lrf, RefusesWhatCannotBe) {
+TEST(Lrf, RefusesInvalidElements) {
   const std::string good_range = "<min>0.1</min><max>8</max>";
   const Refused table[] = {
       {"no lidar", "<sensor name='LRF' type='lidar'/>", "needs a <lidar>"},

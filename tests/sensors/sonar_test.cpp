@@ -296,7 +296,7 @@ struct Refused {
   const char* message;
 };
 
-TEST(Sonar, RefusesWhatCannotBe) {
+TEST(Sonar, RefusesInvalidElements) {
   const std::string good = "<min>0.1</min><max>5</max>";
   const Refused table[] = {
       {"no sonar", "<sensor name='SONAR' type='sonar'/>", "needs a <sonar>"},

@@ -112,7 +112,7 @@ TEST(ContactSensor, OtherLinksOfTheSameBodyAreNotIts) {
   EXPECT_EQ(bench.with({touch(kHull, kBox), touch(kBumper, kBox), touch(kWall, kBumper)}).n, 2);
 }
 
-TEST(ContactSensor, NamedShapesOnly) {
+TEST(ContactSensor, FeelsOnlyItsCollisions) {
   for (const char* name : {"right", "robot::bumper::right"}) {
     Bench bench("<contact><collision>" + std::string(name) + "</collision></contact>");
     EXPECT_FALSE(bench.with({touch(kBumper, kBox, 0)}).pressed) << name;
@@ -148,7 +148,7 @@ TEST(ContactSensor, NamesOfTheConverterOfUrdf) {
     EXPECT_EQ(Bench(contact(name)).bench.findings.list().size(), 1u) << name;
 }
 
-TEST(ContactSensor, AShapeThatIsNotThereIsToldAndTheLinkCounts) {
+TEST(ContactSensor, AMissingShapeIsReportedAndTheLinkCounts) {
   Bench bench("<contact><collision>middle</collision></contact>");
   ASSERT_EQ(bench.bench.findings.list().size(), 1u);
   EXPECT_THAT(bench.bench.findings.list()[0].text,
@@ -210,7 +210,7 @@ contact_t of_rover(const std::string& sensor, const std::string& drive, double a
   return Device::decode<contact_t>(out).at(0);
 }
 
-TEST(ContactSensor, WhatAKinematicRobotStandsOnTouchesThePlane) {
+TEST(ContactSensor, AKinematicRobotTouchesThePlane) {
   for (const char* sensor : {"left_foot", "right_foot", "caster"}) {
     const contact_t m = of_rover(sensor, "kinematic", 0.0);
     EXPECT_TRUE(m.pressed) << sensor;

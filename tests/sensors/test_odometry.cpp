@@ -381,7 +381,7 @@ TEST(Odometry, CovarianceOfTheTwistIsThatOfTheTicks) {
   EXPECT_NEAR(squares / kSamples, tick * tick / 12.0, 0.1 * tick * tick / 12.0);
 }
 
-TEST(Odometry, SlipCanBeSwitchedOffAndAStandingRobotHasNone) {
+TEST(Odometry, SlipCanBeSwitchedOffAndAStandingRobotDoesNotSlip) {
   SensorBench::Options quiet;
   quiet.noise = false;
   Drive off("<ruedo:slip_noise>0.5</ruedo:slip_noise>", false, quiet), ideal(""),

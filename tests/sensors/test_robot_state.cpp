@@ -190,7 +190,7 @@ TEST_F(CollisionsOf, EveryRobotAndTellTheInitialState) {
   EXPECT_EQ(messages()[0].blocked_by, "");
 }
 
-TEST_F(CollisionsOf, ATouchIsToldAtOnceAndItsEndWithTheNextSample) {
+TEST_F(CollisionsOf, PublishesATouchAtOnceAndItsEndWithTheNextSample) {
   step({});
   EXPECT_EQ(messages().size(), 1u);
   step({"wall/l"}, false, 7.0);  // step 2: at once
@@ -245,7 +245,7 @@ TEST_F(CollisionsOf, SeenFromTheOtherSideTheNormalStillPointsToTheRobot) {
   EXPECT_EQ(m.points[0].normal[0], 1.0);
 }
 
-TEST_F(CollisionsOf, WhatBlocksIsToldAtOnce) {
+TEST_F(CollisionsOf, PublishesTheBlockingLinkAtOnce) {
   now_.robots[0].motion.blocked_by = link("crate/l");
   step({});
   step({});
@@ -258,7 +258,7 @@ TEST_F(CollisionsOf, WhatBlocksIsToldAtOnce) {
   EXPECT_EQ(told[2].blocked_by, "");
 }
 
-TEST(Joints, ThoseThatAreNoWheels) {
+TEST(Joints, ListsJointsOtherThanWheels) {
   SensorBench bench(kWorld);
   Device device = bench.make("rover", "joints");
   Snapshot now = bench.snapshot();

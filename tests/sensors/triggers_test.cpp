@@ -68,7 +68,7 @@ const std::string kGreenFor10ms =
 
 using TouchBench = Bench<contact_t>;
 
-TEST(Touch, TellsOnceWhenTheTargetWasTouchedForLonger) {
+TEST(Touch, PublishesOnceAfterTheTargetsTime) {
   TouchBench bench(boxes(kGreenFor10ms), "white", "touch_green");
   EXPECT_FALSE(bench.step(true).at(0).pressed);
   bench.now.contacts = {touch(kFoot, kGreen)};
@@ -105,7 +105,7 @@ struct Case {
   bool counts;
 };
 
-TEST(Touch, OnlyTheTargetAndWhatTheModelFeelsWith) {
+TEST(Touch, OnlyTheTargetAndCollisionsWithASensorCount) {
   const auto target = [](const std::string& name, const std::string& more = "") {
     return "<target>" + name + "</target><time>0</time><enabled>1</enabled>" + more;
   };
@@ -160,7 +160,7 @@ std::vector<std::string> names(const logical_camera_t& message) {
   return all;
 }
 
-TEST(PerformerDetector, TellsWhoComesAndGoes) {
+TEST(PerformerDetector, PublishesPerformersThatEnterAndLeave) {
   Bench<logical_camera_t> bench(region(kBox), "gate", "performer_detector");
   const auto at = [&](double x, double y) -> Bench<logical_camera_t>& {
     bench.now.bodies[0].translation = {x, y, 0.5};

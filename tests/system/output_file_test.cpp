@@ -44,7 +44,7 @@ class OutputFileTest : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(OutputFileTest, TakesItsNameWhenItIsWhole) {
+TEST_F(OutputFileTest, GetsItsNameWhenComplete) {
   for (const std::string words : {"one", "another"}) {
     OutputFile file(path());
     const std::string before = text();
@@ -68,7 +68,7 @@ TEST_F(OutputFileTest, IsWrittenByAProgramInOurPlace) {
   EXPECT_EQ(text(), "by a child");
 }
 
-TEST_F(OutputFileTest, LeavesWhatWasThereWhenItIsNotKept) {
+TEST_F(OutputFileTest, LeavesTheOldFileUnlessKept) {
   write_file(path(), "earlier");
   {
     OutputFile(path()).write("half");
@@ -77,7 +77,7 @@ TEST_F(OutputFileTest, LeavesWhatWasThereWhenItIsNotKept) {
   EXPECT_EQ(names(), std::vector<std::string>{"file"});
 }
 
-TEST_F(OutputFileTest, LeavesWhatWasThereAloneWhenItsProcessIsKilled) {
+TEST_F(OutputFileTest, LeavesTheOldFileWhenItsProcessIsKilled) {
   if (const FileHandle file(::open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666)); !file)
     GTEST_SKIP() << "the file system of " << folder_ << " has no files without a name";
   write_file(path(), "earlier");
@@ -94,7 +94,7 @@ TEST_F(OutputFileTest, LeavesWhatWasThereAloneWhenItsProcessIsKilled) {
   EXPECT_EQ(names(), std::vector<std::string>{"file"});
 }
 
-TEST_F(OutputFileTest, KeepsTheRightsAndTheLinkOfWhatWasThere) {
+TEST_F(OutputFileTest, KeepsThePermissionsAndTheLinkOfTheOldFile) {
   write_file(path(), "earlier");
   fs::permissions(path(), fs::perms::owner_read | fs::perms::owner_write);
   fs::create_symlink("file", folder_ / "link");
@@ -122,7 +122,7 @@ TEST_F(OutputFileTest, HasNothingToDoWithAPartThatWasLeft) {
   EXPECT_TRUE(fs::exists(left));
 }
 
-TEST_F(OutputFileTest, GoesOnWhereADescriptorIs) {
+TEST_F(OutputFileTest, AppendsAtADescriptorsPosition) {
   const FileHandle file(::open(path().c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
   ASSERT_EQ(write_all(file.get(), "before ", 7), 7U);
   write_file("/dev/fd/" + std::to_string(file.get()), "it ");
@@ -131,7 +131,7 @@ TEST_F(OutputFileTest, GoesOnWhereADescriptorIs) {
   EXPECT_EQ(names(), std::vector<std::string>{"file"});
 }
 
-TEST_F(OutputFileTest, NamesTheFileThatCannotBe) {
+TEST_F(OutputFileTest, ReportsAFileThatCannotBeWritten) {
   try {
     const OutputFile file((folder_ / "none" / "file").string());
     FAIL() << "it was opened";

@@ -5,12 +5,12 @@
 namespace ruedo {
 namespace {
 
-TEST(ProgramOutput, IsWhatItPrints) {
+TEST(ProgramOutput, IsTheProgramsStandardOutput) {
   EXPECT_EQ(output_of({"/bin/echo", "a b", "c"}, ItsErrors::shown), "a b c\n");
   EXPECT_EQ(output_of({"/bin/sh", "-c", "echo out; echo error >&2"}, ItsErrors::dropped), "out\n");
 }
 
-TEST(ProgramOutput, IsWholeWhenItIsLong) {  // longer than a pipe holds
+TEST(ProgramOutput, IsCompleteWhenLong) {  // longer than a pipe holds
   const auto text = output_of({"/bin/sh", "-c", "yes | head -c 300000"}, ItsErrors::shown);
   ASSERT_TRUE(text);
   EXPECT_EQ(text->size(), 300000u);

@@ -106,7 +106,7 @@ int executed(const char* program) {
 
 int result(long returned) { return returned < 0 ? errno : 0; }
 
-TEST_F(SandboxTest, AloneItReachesNobody) {
+TEST_F(SandboxTest, AloneItReachesNoOtherProcess) {
   const auto chmod_it = [&] { return result(chmod(read_.c_str(), 0600)); };
   EXPECT_EQ(within(sandbox_, connected), 0);
   EXPECT_EQ(within(sandbox_, [] { return ran("/bin/true"); }), 0);
@@ -136,7 +136,7 @@ TEST_F(SandboxTest, AloneItReachesNobody) {
 }
 
 // Its shell would execute that.
-TEST_F(SandboxTest, NobodyTypesIntoTheTerminal) {
+TEST_F(SandboxTest, CannotTypeIntoTheTerminal) {
   for (const bool alone : {false, true}) {
     sandbox_.alone = alone;
     EXPECT_EQ(within(sandbox_, [] { return result(ioctl(STDIN_FILENO, TIOCSTI, "x")); }), EPERM);

@@ -73,7 +73,7 @@ TEST_F(SealTest, IsAnHmacOfSha256) {
   EXPECT_EQ(hex, "0253fba63c52e1f8d8d2befce65c8b973789c8ca6be6dc8157f304666110b34d");
 }
 
-TEST_F(SealTest, TheKeyIsForNobodyElse) {
+TEST_F(SealTest, TheKeyIsPrivateToItsUser) {
   ASSERT_TRUE(seal_of(bytes_));
   const fs::path path = folder_ / "mine/ruedo/key";
   struct stat status{};

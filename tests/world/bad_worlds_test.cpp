@@ -293,7 +293,7 @@ std::string error_of(const std::string& path) {
   return "";
 }
 
-TEST(BadFiles, AreNamed) {
+TEST(BadFiles, AreReportedWithTheirPath) {
   TemporaryFolder folder;
   EXPECT_EQ(error_of(folder / "none.sdf"), folder / "none.sdf: no such file");
   EXPECT_EQ(error_of(folder.path()), folder.path() + ": is a folder; a file is needed");

@@ -171,7 +171,7 @@ TEST(ConvexPieces, AreAsFewAsTheBodyNeeds) {
   EXPECT_NEAR(sum / (.2 * .16 * .1 - .192 * .152 * .096), 1.0, 1e-3);
 }
 
-TEST(ConvexPieces, NoneForWhatIsConvexOrOpen) {
+TEST(ConvexPieces, LeaveConvexAndOpenMeshesUndivided) {
   EXPECT_TRUE(box({0, 0, 0}, {1, 2, 3}).divided().empty());
   Solid two = box({0, 0, 0}, {1, 1, 1});
   const Solid other = box({3, 0, 0}, {4, 1, 1});

@@ -55,7 +55,7 @@ TEST(Costs, AMeshCountsOnceForEveryScale) {
   EXPECT_THROW(count.add(mesh, Vec3(1, 1, 3), shape), InputError);
 }
 
-TEST(Costs, TrianglesOfWhatStandsStillAreBoundedAtAllPlaces) {
+TEST(Costs, TrianglesOfStaticModelsAreLimited) {
   Model wall;
   wall.is_static = true;
   wall.links.emplace_back();

@@ -25,7 +25,7 @@ std::vector<std::string> of_joint(const std::string& type, const std::string& lo
                 "</lower><upper>" + upper + "</upper></limit></axis></joint></model>"));
 }
 
-TEST(Degrees, OfAPoseAreNamedWithTheirLine) {
+TEST(Degrees, WarnWithTheLineOfAPose) {
   const auto world =
       world_of("\n<model name='m'>\n<link name='l'>\n<pose>0 0 0.5 0 0 90</pose></link></model>");
   ASSERT_EQ(world->findings.size(), 1u);
@@ -39,7 +39,7 @@ TEST(Degrees, OfAPoseAreNamedWithTheirLine) {
   EXPECT_EQ(of_pose("", "1 2 3 0 1e1 0").size(), 1u);
 }
 
-TEST(Degrees, OfAPoseThatSaysSoAndRadiansAreNotNamed) {
+TEST(Degrees, NoWarningForDeclaredDegreesAndRadians) {
   for (const char* degrees : {" degrees='true'", " degrees='1'", " degrees='True'"})
     EXPECT_THAT(of_pose(degrees, "0 0 0.5 0 0 90"), IsEmpty()) << degrees;
   EXPECT_EQ(of_pose(" degrees='false'", "0 0 0.5 0 0 90").size(), 1u);
@@ -50,7 +50,7 @@ TEST(Degrees, OfAPoseThatSaysSoAndRadiansAreNotNamed) {
     EXPECT_THAT(of_pose("", text), IsEmpty()) << text;
 }
 
-TEST(Degrees, OfStopsAreNamedWhereTheJointTurns) {
+TEST(Degrees, WarnForLimitsOfRevoluteJointsOnly) {
   EXPECT_THAT(of_joint("revolute", "-180", "135"),
               ElementsAre(std::string("<lower>-180</lower>") + kRadians + "write radians",
                           std::string("<upper>135</upper>") + kRadians + "write radians"));
@@ -60,7 +60,7 @@ TEST(Degrees, OfStopsAreNamedWhereTheJointTurns) {
     EXPECT_THAT(of_joint("revolute", std::string("-") + far, far), IsEmpty()) << far;
 }
 
-TEST(Degrees, OfAUrdfAreNamed) {
+TEST(Degrees, WarnInAUrdf) {
   const auto world = load_world_text(
       R"(<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>

@@ -52,7 +52,7 @@ const char* const kCar =
 
 // A model with wheels that look driven: a sensor makes it a robot, whose drive is guessed, unless
 // the file says that its joints take commands, or that it does not drive.
-TEST(DriveKinds, AFileMaySayThatThereIsNone) {
+TEST(DriveKinds, AFileMayDeclareThatThereIsNoDrive) {
   const std::string robot =
       "<model name='m'><link name='base'><sensor name='s' type='imu'/></link>" +
       wheel("left_wheel", "0 0.2 0.1 0 0 0") + wheel("right_wheel", "0 -0.2 0.1 0 0 0");
@@ -149,7 +149,7 @@ struct BadDrive {
   const char* error;
 };
 
-TEST(DriveKinds, WhatIsMissingIsNamed) {
+TEST(DriveKinds, ReportsMissingElements) {
   const BadDrive table[] = {
       {"<ruedo:drive steering='crab'/>",
        "<ruedo:drive>: steering 'crab' is not allowed; allowed are differential, tracked, "
@@ -247,7 +247,7 @@ TEST(DrivePlugins, APlanarMoveNeedsNoWheels) {
   }
 }
 
-TEST(DrivePlugins, APlanarMoveNeedsNoneOfTheJointsThatItNames) {
+TEST(DrivePlugins, APlanarMoveIgnoresItsJoints) {
   const auto world = world_of(
       "<model name='m'><link name='base'/><plugin name='p' filename='libgazebo_ros_planar_move.so'>"
       "<leftFrontJoint>j_l</leftFrontJoint></plugin></model>");
@@ -330,7 +330,7 @@ TEST(DrivePlugins, TheSlotcarOfRmfDrives) {
 
 // A vendor's plugin library drives if it has the usual elements; one without wheels of the model
 // does not.
-TEST(DrivePlugins, OneThatIsNotKnownDrivesByTheWheelsThatItNames) {
+TEST(DrivePlugins, AnUnknownPluginDrivesByItsWheels) {
   const auto robot = [](const std::string& file, const std::string& inside) {
     return world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
                     wheel("r", "0 -0.2 0.1 0 0 0") + "<plugin name='p' filename='" + file + "'>" +
@@ -377,7 +377,7 @@ TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
   EXPECT_EQ(kind("x", "gz-sim-imu-system").does, Does::served);
 }
 
-TEST(DrivePlugins, OfWhichNothingComesAreNamedWithWhatTheyWouldDo) {
+TEST(DrivePlugins, WarnsAboutPluginsWithoutEffect) {
   const auto world = world_of(
       "<model name='m'><link name='l'/><plugin name='a' "
       "filename='libBuoyancyPlugin.so'/><plugin name='b' filename='libRayPlugin.so'/>"

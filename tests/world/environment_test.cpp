@@ -53,7 +53,7 @@ TEST(Environment, OtherGlobes) {
             12000.0);
 }
 
-TEST(Environment, AnotherGlobesAxesAreNamed) {
+TEST(Environment, WarnsAboutAxesOfAnotherSurfaceModel) {
   const std::string axes =
       "<surface_axis_equatorial>12000</surface_axis_equatorial>"
       "<surface_axis_polar>10000</surface_axis_polar>";
@@ -76,7 +76,7 @@ TEST(Environment, OldFilesHaveTheFieldInTheirPhysics) {
 }
 
 // Faulty elements are reported and left out; the world still loads.
-TEST(Environment, WhatIsWrongIsNamed) {
+TEST(Environment, ReportsInvalidElements) {
   struct Case {
     const char* inside;
     const char* error;

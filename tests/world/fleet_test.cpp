@@ -110,7 +110,7 @@ TEST_F(Fleets, RandomPlacesAreApartAndRepeat) {
   EXPECT_NE(other->models[40].X_WM.translation, world->models[40].X_WM.translation);
 }
 
-TEST_F(Fleets, RefuseWhatHasNoRoom) {
+TEST_F(Fleets, RefuseMoreRobotsThanFit) {
   const std::string two = "<ruedo:count>2</ruedo:count>";
   EXPECT_EQ(error_of("name='r'", two, box("wall", "0.6 0 1 0 0 0", "0.2 4 2")),
             "<ruedo:fleet>: there is no room for 'r_2' at 0.6 0: it would stand in 'wall'");
@@ -121,7 +121,7 @@ TEST_F(Fleets, RefuseWhatHasNoRoom) {
             "or a smaller <ruedo:spacing> helps");
 }
 
-TEST_F(Fleets, RefuseWhatIsWrong) {
+TEST_F(Fleets, RefuseInvalidElements) {
   const std::string two = "<ruedo:count>2</ruedo:count>";
   EXPECT_EQ(error_of("", two), "<ruedo:fleet>: has no name; the attribute name is required");
   EXPECT_EQ(error_of("name='r'", ""), "<ruedo:fleet>: has no <ruedo:count>");
@@ -177,7 +177,7 @@ TEST(DriveOption, GivesARobotItsWheels) {
   EXPECT_TRUE(included->findings.empty());  // nothing of a guess that did not count
 }
 
-TEST(DriveOption, SaysWhatThereIs) {
+TEST(DriveOption, ErrorsListTheJoints) {
   TemporaryFolder folder;
   const std::string urdf = folder.write("bot.urdf", kUrdf);
   const auto error = [&](const world::DriveOption& drive) {

@@ -40,7 +40,7 @@ TEST(Holds, OfANestedModel) {
   EXPECT_EQ(world->models[0].model->holds.at(0).other_link, "in.x");
 }
 
-TEST(Holds, WhatIsNotThereIsNamed) {
+TEST(Holds, ReportsMissingModelsAndLinks) {
   const auto world = world_of(
       "<model name='m'><link name='a'/>" + hold("a", "bax", "l") + hold("a", "box", "k") +
       hold("c", "box", "l") +
@@ -56,7 +56,7 @@ TEST(Holds, WhatIsNotThereIsNamed) {
                   "DetachableJoint: the model 'box' has no link 'k'; nothing is held"));
 }
 
-TEST(Holds, OfWhatCannotBeHeldIsNamed) {
+TEST(Holds, ReportsLinksOfOneBody) {
   const auto world = world_of(
       "<model name='m'><link name='a'/><link name='b'/><link name='c'/><joint name='j' "
       "type='fixed'><parent>a</parent><child>b</child></joint>" +

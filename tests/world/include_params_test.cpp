@@ -86,7 +86,7 @@ TEST(IncludeParams, ChangeOneIncludeOnly) {
   EXPECT_THAT(sensors(*world->models.at(1).model), ElementsAre("eye", "gps"));
 }
 
-TEST(IncludeParams, WhatCannotBeDoneIsNamedAndTheRestIsDone) {
+TEST(IncludeParams, ReportsInvalidChangesAndAppliesTheRest) {
   struct Case {
     const char* params;
     const char* text;

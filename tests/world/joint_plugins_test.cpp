@@ -77,7 +77,7 @@ TEST(JointPlugins, ATrajectoryControllersGainsAreOfEachJoint) {
   EXPECT_FALSE(axis(*world, 0).rate_pid);
 }
 
-TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
+TEST(JointPlugins, ReportsErrorsAndUnsupportedElements) {
   const auto world = world_of(
       arm(plugin("JointPositionController", "<joint_name>three</joint_name>") +
           plugin("JointController",
@@ -94,7 +94,7 @@ TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
   EXPECT_FALSE(axis(*world, 1).position_pid);
 }
 
-TEST(JointPlugins, OfJointsThatMoveOtherwiseAreNamed) {
+TEST(JointPlugins, ReportsJointsThatAnythingElseMoves) {
   const auto of = [](const std::string& joint, const std::string& more) {
     return texts(*world_of(
         arm(plugin("JointPositionController", "<joint_name>" + joint + "</joint_name>") + more)));
@@ -141,7 +141,7 @@ struct Named {
 };
 
 // Systems of gz-sim and plugins of Gazebo Classic that act in Gazebo but not here.
-TEST(PluginParameters, AreNamed) {
+TEST(PluginParameters, WarnsAboutParametersWithoutEffect) {
   const std::string gz = "gz::sim::systems::";
   const Named cases[] = {
       {"f", gz + "PosePublisher", "<update_frequency>10</update_frequency>", "50 times a second"},
@@ -227,7 +227,7 @@ TEST(RosGains, OfGazeboRosControl) {
   EXPECT_FALSE(axis(*world, 0).rate_pid);
 }
 
-TEST(RosGains, BelowNothingAreNamed) {
+TEST(RosGains, ReportsNegativeGains) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", "<package><name>bot</name></package>");
   folder.write("bot/config/control.yaml",
@@ -298,7 +298,7 @@ turn_controller:
                                          "which is not one of its joints"));
 }
 
-TEST(RosGains, OfPidControllersAndConstraintsThatAreNamed) {
+TEST(RosGains, ReadsPidControllersAndWarnsAboutConstraints) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", "<package><name>bot</name></package>");
   folder.write("bot/config/control.yaml", R"(controller_manager:

@@ -59,7 +59,7 @@ TEST(Map, WorldCutByHand) {
   EXPECT_EQ(drawn(above), "........\n........\n..####..\n........\n........\n");
 }
 
-TEST(Map, RobotsAndWalkersAreNoWalls) {
+TEST(Map, LeavesOutRobotsAndWalkers) {
   const auto world =
       load(shape("robot", "0 0 0.5 0 0 0", "<box><size>1 1 1</size></box>",
                  "<link name='s'><sensor name='imu' type='imu'/></link>") +
@@ -90,7 +90,7 @@ std::string yard(const std::string& robot_at) {
                                  "</link></model>");
 }
 
-TEST(Map, WhatLiesOutsideOfTheWallsIsUnknown) {
+TEST(Map, OutsideOfTheWallsCellsAreUnknown) {
   const auto map_of = [](const std::string& robot_at) {
     const auto world = load(yard(robot_at));
     OccupancyGrid grid = occupancy_of(*world, 1, 0.5);
@@ -211,7 +211,7 @@ std::optional<InputError> error_of(const std::string& path) {
   return std::nullopt;
 }
 
-TEST(Map, WrongFilesSayWhatIsWrong) {
+TEST(Map, ReportsMalformedFiles) {
   TemporaryFolder folder;
   folder.write("ok.pgm", std::string("P5\n1 1\n255\n\x00", 12));
   folder.write("no.png", "hello");
@@ -321,7 +321,7 @@ TEST(Map, ReachesItsOwnFolder) {
   EXPECT_FALSE(reads("/nowhere/none.pgm", false));  // whether it is there is not said
 }
 
-TEST(Map, WhatYamlAllows) {
+TEST(Map, AcceptsAllYamlSpellings) {
   TemporaryFolder folder;
   folder.write("m.pgm", std::string("P5\n1 1\n255\n\x00", 12));
   Findings findings;

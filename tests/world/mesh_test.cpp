@@ -292,7 +292,7 @@ TEST_F(Meshes, MaterialsAndTheirFile) {
 }
 
 // Once, where a picture would have been seen.
-TEST_F(Meshes, TexturesThatAreNotThereAreNamed) {
+TEST_F(Meshes, WarnsAboutMissingTextures) {
   folder.write("box.mtl", "newmtl red\nKd 0.8 0.1 0.2\nmap_Kd paint.png\n");
   const std::string path = folder.write("box.obj", obj());
   const std::string box = "<geometry><mesh><uri>box.obj</uri></mesh></geometry>";
@@ -435,7 +435,7 @@ TEST_F(Meshes, MalformedFilesAreFaults) {
   EXPECT_NE(fault_of(folder.write("half.ply", ply().substr(0, 302)), impatient), "");
 }
 
-TEST(MeshFormat, RefusesWhatDoesNotFit) {
+TEST(MeshFormat, RefusesInconsistentMeshes) {
   MeshPackage package;
   package.mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   package.mesh.triangles = {{0, 1, 2}};

@@ -143,7 +143,7 @@ TEST(Includes, OverridesAndNames) {
 // The mast's frame is 1 m ahead of the cart's and turned left by a right angle: its sensor is 1.2 m
 // ahead, looking left.
 // The first one counts, of a file as of an element.
-TEST(Includes, WhatElseIsThereIsNamed) {
+TEST(Includes, WarnsAboutFurtherModelsOfAFile) {
   const TemporaryFolder folder;
   const std::string link = "<link name='l'/></model>";
   folder.write("m.sdf", "<sdf version='1.9'><model name='a'>" + link + "<model name='b'>" + link +
@@ -240,7 +240,7 @@ TEST(Names, OfSensors) {
   EXPECT_NO_THROW(link_of(*world->models.at(0).model, "arm.hand"));
 }
 
-TEST(Names, ASecondThingIsRenamedAndTold) {
+TEST(Names, RenamesDuplicatesWithAFinding) {
   const auto world = world_of(
       "<model name='box'><link name='l'/></model><model name='box'><link name='l'/></model>");
   ASSERT_EQ(world->models.size(), 2u);
@@ -322,7 +322,7 @@ TEST(Model, TheSolverOfTheWorldIsRead) {
       1u);
 }
 
-TEST(Findings, WhatIsNotSupportedIsNamedOnce) {
+TEST(Findings, ReportsUnsupportedElementsOnce) {
   const auto world = world_of(
       "<gui><camera name='c'/></gui><road name='r'/><physics "
       "type='ode'><max_step_size>0.0033333333</max_step_size></physics>"

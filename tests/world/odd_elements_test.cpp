@@ -31,7 +31,7 @@ TEST(OddElements, AWorldMayBeNamedWorld) {
 }
 
 // As in Gazebo Classic. For everything else, "world" is the world.
-TEST(OddElements, AModelNamedWorldHasAnotherName) {
+TEST(OddElements, RenamesAModelNamedWorld) {
   std::string model = kBox;
   model.replace(model.find("'box'"), 5, "'world'");
   const auto world = world_of(model +
@@ -192,7 +192,7 @@ TEST(OddElements, AMissingPrefixIsGuessed) {
               ElementsAre("<drive> is not known and left out; did you mean <ruedo:drive>?"));
 }
 
-TEST(OddElements, WhatWasSilentIsNamed) {
+TEST(OddElements, ReportsElementsThatWereSilentlyIgnored) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
   EXPECT_THAT(
       named("<wind/><atmosphere type='adiabatic'/><magnetic_field>1e-5 0 0</magnetic_field>"),
@@ -217,7 +217,7 @@ TEST(OddElements, WhatWasSilentIsNamed) {
 }
 
 // Deep inside an element, too, and in attributes.
-TEST(OddElements, WhatSdfDoesNotHaveIsNamed) {
+TEST(OddElements, ReportsElementsThatSdfLacks) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
   EXPECT_THAT(
       named("<model name='m'><link name='l'><collision name='c'><geometry><box><size>1 1 "
@@ -247,7 +247,7 @@ TEST(OddElements, AFindingIsOneLine) {
 }
 
 // Readers take the first. In Ruedo's own elements, too.
-TEST(OddElements, ASecondOfWhatThereIsOnceIsNamed) {
+TEST(OddElements, ReportsDuplicateElements) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
   const auto left_out = [](const std::string& what, const std::string& in) {
     return "a second <" + what + "> in <" + in + "> is left out; the first one counts";
@@ -274,7 +274,7 @@ TEST(OddElements, ASecondOfWhatThereIsOnceIsNamed) {
               ElementsAre(left_out("sphere", "geometry"), left_out("origin", "joint")));
 }
 
-TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
+TEST(OddElements, ReportsElementsThatUrdfLacks) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'><collisoin/><visual><geometry><box size='1 1 "
       "1'/></geometry></visual></link><link name='b'/>\n"
@@ -291,7 +291,7 @@ TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
 }
 
 // One list of their addresses with the command that fetches them, instead of a text for each.
-TEST(OddElements, MissingModelsOfFuelAreOneList) {
+TEST(OddElements, ListsMissingModelsOfFuelOnce) {
   const auto world = world_of(
       "<include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/No Such "
       "One</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Nor "

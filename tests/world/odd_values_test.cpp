@@ -39,7 +39,7 @@ std::string plugin(const std::string& kind, const std::string& inside) {
 
 std::vector<std::string> named(const std::string& inside) { return texts(*world_of(inside)); }
 
-TEST(OddDrives, OfAModelThatTheyDoNotMove) {
+TEST(OddDrives, OfAModelThatCannotMove) {
   EXPECT_THAT(named(robot(drive())), IsEmpty());
   EXPECT_THAT(named(robot(drive() + "<static>true</static>")),
               ElementsAre("the model is static: its drive moves nothing"));
@@ -52,7 +52,7 @@ TEST(OddDrives, OfAModelThatTheyDoNotMove) {
               ElementsAre("the model moves by its <ruedo:path>: its drive moves nothing"));
 }
 
-TEST(OddDrives, WhoseSidesAreSwapped) {
+TEST(OddDrives, WithSwappedSides) {
   const std::string other = "<left_joint>jr</left_joint><right_joint>jl</right_joint>";
   const auto world = world_of(robot(plugin("DiffDrive", other)));
   EXPECT_THAT(texts(*world),
@@ -69,7 +69,7 @@ TEST(OddDrives, MayHaveElementsOfAnotherType) {
   EXPECT_THAT(named(robot(drive(gear, " type='wheels'"))), IsEmpty());
 }
 
-TEST(OddDrives, WhoseWheelsCannotRoll) {
+TEST(OddDrives, WithWheelsThatCannotRoll) {
   const std::string cannot = "the joint 'jr' cannot roll a wheel: ",
                     anyhow = "; the kinematic drive moves the robot regardless";
   EXPECT_THAT(named(robot(drive(), "0 0 1")), ElementsAre(cannot + "its axis is upright" + anyhow));
@@ -180,7 +180,7 @@ TEST(OddValues, PluginsOfModelsInAWorld) {
                           "a model"));
 }
 
-TEST(OddValues, FramesThatAreNowhere) {
+TEST(OddValues, MissingFrames) {
   EXPECT_THAT(named("<frame name='a' attached_to='b'/><frame name='b' attached_to='a'/>"),
               ElementsAre("<frame>: 'a' is placed relative to itself, through other frames; the "
                           "frame is left out",
@@ -188,7 +188,7 @@ TEST(OddValues, FramesThatAreNowhere) {
                           "frame is left out"));
 }
 
-TEST(OddValues, StatesOfWhatIsNotThere) {
+TEST(OddValues, StatesOfMissingModels) {
   EXPECT_THAT(
       named("<model name='m'><link name='l'/></model><state world_name='w'><model name='m'>"
             "<pose>0 0 0 0 0 0</pose><link name='k'><pose>0 0 0 0 0 0</pose></link><joint name='j'>"

@@ -179,7 +179,7 @@ TEST_F(Options, SetChangesOneRobotOnly) {
   EXPECT_EQ(other.drive->max_speed, std::numeric_limits<double>::infinity());
 }
 
-TEST_F(Options, SetSaysWhatThereIs) {
+TEST_F(Options, SetErrorsListTheCandidates) {
   const auto error = [&](const Setting& setting) {
     LoadOptions options = with_bot();
     options.settings = {setting};
@@ -209,7 +209,7 @@ TEST_F(Options, SetSaysWhatThereIs) {
             "allowed is a number above 0, or inf");
 }
 
-TEST_F(Options, NoiseOfTypeNoneIsNotSet) {
+TEST_F(Options, SetCannotChangeNoiseOfTypeNone) {
   const Setting deviation{"bot", "LRF", "noise.stddev", "0.01"};
   LoadOptions options = with_bot();
   options.settings = {deviation};

@@ -343,7 +343,7 @@ TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
   EXPECT_TRUE(drive_of(*world).guessed);
 }
 
-TEST(RosControl, AFileThatIsNotThereIsNamed) {
+TEST(RosControl, ReportsAMissingFile) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(
       "bot.urdf",
@@ -354,7 +354,7 @@ TEST(RosControl, AFileThatIsNotThereIsNamed) {
               testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
 }
 
-TEST(RosControl, ParametersWithoutEffectAreOneFinding) {
+TEST(RosControl, ReportsParametersWithoutEffectOnce) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
   folder.write("bot/config/control.yaml", R"(drive:
@@ -405,7 +405,7 @@ struct Wrong {
   bool drives = false;  // as the file says
 };
 
-TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
+TEST(RosControl, ReportsFaultsOfAReferencedFile) {
   const std::string good = kManager + kBase + kHold;
   ASSERT_THAT(texts(*named_world(good)), IsEmpty());
   const Wrong table[] = {
@@ -440,7 +440,7 @@ TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
   }
 }
 
-TEST(RosControl, SizesOfNothingAreNamed) {
+TEST(RosControl, ReportsZeroSizes) {
   const auto world = named_world(kManager + with(kBase, "separation: 0.61", "separation: 0.0"));
   EXPECT_THAT(texts(*world),
               ElementsAre("controller 'base': wheel_separation '0.0' is not allowed; allowed is a "
@@ -449,7 +449,7 @@ TEST(RosControl, SizesOfNothingAreNamed) {
   EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
 }
 
-TEST(RosControl, MistypedTypesAreNamed) {
+TEST(RosControl, ReportsMisspelledTypes) {
   const std::string good = kManager + kBase + kHold, type = "diff_drive_controller/DiffDrive";
   EXPECT_THAT(texts(*named_world(with(good, type + "Controller", type + "Contoller"))),
               ElementsAre("controllers of type 'diff_drive_controller/DiffDriveContoller' are not "
@@ -465,7 +465,7 @@ TEST(RosControl, MistypedTypesAreNamed) {
 }
 
 // ROS would run one of them at a time.
-TEST(RosControl, ASecondOfADriveAndOfGainsIsNamed) {
+TEST(RosControl, ReportsASecondDriveAndSecondGains) {
   const std::string more =
       "    base2: {type: diff_drive_controller/DiffDriveController}\n"
       "    hold2: {type: effort_controllers/JointPositionController}\n";
@@ -480,7 +480,7 @@ TEST(RosControl, ASecondOfADriveAndOfGainsIsNamed) {
                   "controller already"));
 }
 
-TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
+TEST(RosControl, ReportsReferencedFilesWithoutControllers) {
   for (const std::string& text : {std::string(), std::string("hello"), std::string("- a\n- b\n"),
                                   std::string("\1\2"), std::string("a: {b: 1}\n"), kBase})
     EXPECT_THAT(texts(*named_world(text)),
@@ -494,7 +494,7 @@ TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
 }
 
 // Also beside others that have one, and where ROS 2's manager says nothing of a node.
-TEST(RosControl, ControllersWithoutATypeAreNamed) {
+TEST(RosControl, ReportsControllersWithoutAType) {
   const std::string broadcaster = "    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";
   const auto ros2 = named_world("controller_manager:\n  ros__parameters:\n" + broadcaster + kBase);
   EXPECT_THAT(texts(*ros2),
@@ -505,14 +505,14 @@ TEST(RosControl, ControllersWithoutATypeAreNamed) {
   EXPECT_THAT(texts(*named_world(kManager + kBase)), IsEmpty());
 }
 
-TEST(RosControl, ADriveThatNamesNoWheelsIsNamed) {
+TEST(RosControl, ReportsADriveWithoutWheels) {
   const auto world = named_world(kManager + with(kBase, "left_wheel_names", "left_wheels_names"));
   EXPECT_THAT(texts(*world), testing::Contains(HasSubstr("names no wheels: it drives nothing")));
 }
 
 // NaN and infinity in all spellings that ROS 2 reads, and its wildcard for the names of nodes,
 // which counts where a node of the name says nothing.
-TEST(RosControl, LimitsThatAreNoneAndWildcards) {
+TEST(RosControl, ReadsInfiniteLimitsAndWildcards) {
   for (const char* none : {".nan", ".NaN", ".NAN", ".inf", ".Inf", "+.INF"}) {
     const auto world = named_world(
         kManager + with(kBase, "max_velocity: 1.0", "max_velocity: " + std::string(none)));
@@ -602,7 +602,7 @@ TEST(ControllerFiles, AreReadOnceAndAreBounded) {
   EXPECT_THROW(many.read(large), InputError);
 }
 
-TEST(ControllerFiles, ThatARobotNamesOftenAreOne) {
+TEST(ControllerFiles, ARepeatedReferenceIsReadOnce) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
   std::string entries = "1";
@@ -735,7 +735,7 @@ TEST(Guess, TheFlagSaysItOtherwise) {
 }
 
 // An arm has no wheels, and a cart that is furniture has no drive.
-TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
+TEST(Guess, MakesNoRobotOfAnArmOrACart) {
   TemporaryFolder folder;
   const auto arm = load_world(folder.write(
       "arm.urdf",

@@ -59,7 +59,7 @@ TEST(SavedState, PutsJointsBackByTheirPositions) {
 }
 
 // A drawer that is a third open; a joint that mimics it follows as before.
-TEST(InitialPosition, MovesWhatTheJointCarries) {
+TEST(InitialPosition, MovesTheJointsChildren) {
   const auto world = world_of(
       "<model name='m'><link name='a'/><link name='b'/><link name='c'/><joint name='j' "
       "type='prismatic'><parent>a</parent><child>b</child><axis><xyz>1 0 0</xyz>"
@@ -89,7 +89,7 @@ TEST(InitialPosition, OfRos2Control) {
   EXPECT_EQ(link_of(*world->models.back().model, "b").X_ML.translation, Vec3(0, 0, 0.7));
 }
 
-TEST(SavedState, NamesWhatItCannotPutBack) {
+TEST(SavedState, ReportsStatesThatItCannotRestore) {
   const auto world =
       world_of(kArm +
                "<state world_name='w'><model name='arm'><pose>5 0 0 0 0 0</pose>"
@@ -113,7 +113,7 @@ TEST(SavedState, OfAModelWithoutAPose) {
   EXPECT_NEAR(link_of(*world->models.at(0).model, "hand").X_ML.translation.z(), 2.25, 1e-9);
 }
 
-TEST(SavedState, NamesWhatItDoesNotRead) {
+TEST(SavedState, ReportsUnknownElements) {
   EXPECT_THAT(
       texts(*world_of(kArm +
                       "<state world_name='w'><modle name='arm'/><model name='arm'><pose>5 0 0 0 0 0"

@@ -6,7 +6,7 @@
 namespace ruedo::world {
 namespace {
 
-TEST(SdfElements, NoneOfAWorldIsSilent) {
+TEST(SdfElements, EveryElementOfAWorldActsOrIsReported) {
   const auto of_the_world = [](const std::string& path) {
     return path.find("/sensor") == std::string::npos;
   };

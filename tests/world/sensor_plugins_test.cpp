@@ -114,7 +114,7 @@ TEST(SensorPlugins, AForceTorqueSensorIsInItsJoint) {
               ElementsAre(HasSubstr("'k' is not a joint")));
 }
 
-TEST(SensorPlugins, WhatDoesNotActOrIsWrongIsNamed) {
+TEST(SensorPlugins, ReportsErrorsAndElementsWithoutEffect) {
   struct Case {
     const char* library;
     const char* inside;
@@ -156,7 +156,7 @@ TEST(JointSensors, AreRead) {
   EXPECT_EQ(urdf->models.back().model->sensors.at(0).joint, 0);
 }
 
-TEST(SensorPlugins, TriggersThatCannotBeReadAreNamed) {
+TEST(SensorPlugins, ReportsMalformedTriggers) {
   const std::string touch = "gz-sim-touch-plugin-system", name = "gz::sim::systems::TouchPlugin",
                     detector = "gz::sim::systems::PerformerDetector";
   EXPECT_THAT(texts(*with(touch, "<time>1</time><enabled>true</enabled>", name)),
@@ -173,7 +173,7 @@ TEST(SensorPlugins, TriggersThatCannotBeReadAreNamed) {
               ElementsAre("PerformerDetector detects nobody: the world has no <performer>"));
 }
 
-TEST(SensorPlugins, PerformersThatAreNowhereAndLevelsAreNamed) {
+TEST(SensorPlugins, ReportsMissingPerformersAndLevels) {
   const auto world = world_of(
       "<plugin name='ignition::gazebo' filename='dummy'><performer name='p'><ref>robot</ref>"
       "<geometry><box><size>1 1 1</size></box></geometry></performer><performer name='q'><ref>m"

@@ -44,7 +44,7 @@ std::string driven() {
 
 class Unsupported : public testing::TestWithParam<Part> {};
 
-TEST_P(Unsupported, IsNamedOnceWithItsLine) {
+TEST_P(Unsupported, IsReportedOnceWithItsLine) {
   const auto world = load_world_text(
       "<sdf version='1.9'><world name='w'>\n<model name='m'><link name='a'/><link name='b'/>\n" +
           GetParam().inside + "</model></world></sdf>",
@@ -120,7 +120,7 @@ INSTANTIATE_TEST_SUITE_P(
              "a second drive, of the nested model 'k', is not supported: its wheels turn freely"}),
     [](const auto& info) { return std::string(info.param.name); });
 
-TEST(Mimic, UrdfAndSdfSayWhoLeads) {
+TEST(Mimic, UrdfAndSdfNameTheLeader) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\n"
       "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
@@ -146,7 +146,7 @@ TEST(Mimic, UrdfAndSdfSayWhoLeads) {
   EXPECT_EQ(sdf->models[0].model->joints[1].mimic_reference, 0.25);
 }
 
-TEST(Mimic, APluginOfClassicSaysWhoLeads) {
+TEST(Mimic, APluginOfClassicNamesTheLeader) {
   const auto world = [](const std::string& leader) {
     return load_world_text(
         "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\n"
@@ -172,7 +172,7 @@ TEST(Mimic, APluginOfClassicSaysWhoLeads) {
 
 // A leader that does not exist, or that follows its own follower, is an error; the joint then moves
 // on its own.
-TEST(Mimic, NobodyFollowsNobodyOrItself) {
+TEST(Mimic, RejectsMissingLeadersAndCycles) {
   const auto finding = [](const std::string& leader) {
     const auto world = load_world_text(
         "<sdf version='1.9'><world name='w'>\n<model name='m'><link name='a'/><link name='b'/>\n" +

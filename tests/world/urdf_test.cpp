@@ -21,7 +21,7 @@ std::vector<std::string> texts(const WorldModel& world) {
 
 // An arm on a table of the world, 0.7 m up: its links are not loose, and do not lose a link to the
 // world.
-TEST(Urdf, ARootNamedWorldIsTheWorld) {
+TEST(Urdf, ARootLinkNamedWorldFixesTheRobot) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("arm.urdf", R"(<robot name="arm"><link name="world"/>
 <link name="base"><inertial><mass value="4"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -38,7 +38,7 @@ TEST(Urdf, ARootNamedWorldIsTheWorld) {
   EXPECT_EQ(arm.joints[0].child, 0);
 }
 
-TEST(Urdf, APlaceThatCannotBeReadIsNamedAndTheRobotStays) {
+TEST(Urdf, ReportsMalformedOriginsAndKeepsTheRobot) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("bot.urdf", R"x(<robot name="bot">
   <link name="a"/><link name="b"/><link name="c"/>
@@ -122,7 +122,7 @@ TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
 }
 
 // A joint without limits may turn and slide without bounds.
-TEST(Urdf, AJointWithoutLimitsHasNone) {
+TEST(Urdf, AJointWithoutLimitsIsUnlimited) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(
       "bot.urdf",
@@ -149,7 +149,7 @@ TEST(Urdf, OnlyTheRootMayBeTheWorld) {
   }
 }
 
-TEST(Urdf, WhatTheWorldLinkShowsIsNamed) {
+TEST(Urdf, ReportsShapesOfTheWorldLink) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(
       "arm.urdf",
@@ -348,7 +348,7 @@ TEST(Urdf, PackagesGoByTheFolderThatTheFileIsIn) {
 
 // Packages of a workspace lie beside each other, in folders of any name; a world's <include> finds
 // robots there, and robots their meshes.
-TEST(Urdf, PackagesLieBesideEachOther) {
+TEST(Urdf, FindsPackagesBesideEachOther) {
   TemporaryFolder folder;
   folder.write("src/one/package.xml", "<package><name>bot_gazebo</name></package>");
   folder.write("src/two/package.xml", "<package><name>bot_description</name></package>");
@@ -395,7 +395,7 @@ TEST(Urdf, AFaultInALinkCostsThatPartAlone) {
   EXPECT_EQ(heavy->findings[0].source.line, 2);
 }
 
-TEST(Urdf, WhatGazebosBlocksHaveBesidesIsNamed) {
+TEST(Urdf, ReportsUnknownElementsOfGazeboBlocks) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'><parent "
       "link='a'/><child link='b'/></joint>"
@@ -411,7 +411,7 @@ TEST(Urdf, WhatGazebosBlocksHaveBesidesIsNamed) {
 }
 
 // As Gazebo takes them: springs of joints, colours, friction's direction, and elements of a link.
-TEST(Urdf, WhatGazebosBlocksSayActs) {
+TEST(Urdf, GazeboBlocksAct) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'><visual><geometry><box size='1 1 1'/></geometry></visual>"
       "<collision><geometry><box size='1 1 1'/></geometry></collision></link><link name='b'/>"
@@ -433,7 +433,7 @@ TEST(Urdf, WhatGazebosBlocksSayActs) {
 }
 
 // The user's own folder is no package, whatever a file calls it.
-TEST(Urdf, TheHomeFolderIsNoPackage) {
+TEST(Urdf, DoesNotSearchTheHomeFolderForPackages) {
   TemporaryFolder folder;
   folder.write("ann/pictures/a.obj", kTetrahedron);
   const std::string file =

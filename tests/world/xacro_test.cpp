@@ -94,7 +94,7 @@ TEST(Xacro, FindsPackagesBehindManyOthers) {
   EXPECT_EQ(world->models.back().model->links.size(), 2u);
 }
 
-TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
+TEST(Xacro, SkipsAMissingInclude) {
   const Packages packages;
   const auto world = load_world(
       packages.folder.write("bot/bot.xacro",
@@ -105,7 +105,7 @@ TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
 }
 
 // Nobody has a folder with the name that replaces a missing package.
-TEST(Xacro, WhatLiesInAPackageThatIsNotThereIsNamedAsWritten) {
+TEST(Xacro, ReportsFilesOfMissingPackagesAsWritten) {
   const Packages packages;
   const auto world = load_world(packages.folder.write(
       "bot/bot.xacro",
@@ -119,7 +119,7 @@ TEST(Xacro, WhatLiesInAPackageThatIsNotThereIsNamedAsWritten) {
                   "the controllers' file 'package://nowhere/c.yaml' is not found"));
 }
 
-TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
+TEST(Xacro, ReportsErrorsInOneLine) {
   const Packages packages;
   const auto error_of = [&](const std::string& text) {
     try {
@@ -153,7 +153,7 @@ std::string robot_of(const std::string& expression) {
          expression + "}\"/></robot>";
 }
 
-TEST(Xacro, WhatAStrangersFileExecutesReachesNothing) {
+TEST(Xacro, UntrustedExpressionsReachNothing) {
   const TemporaryFolder folder, elsewhere;
   const std::string secret = elsewhere.write("secret.yaml", "word: hunter2");
   const std::string own = folder.write("bot/urdf/own.txt", "own");

@@ -119,7 +119,7 @@ TEST(WorldTextTest, EveryRotationReadsBack) {
   }
 }
 
-TEST(WorldTextTest, WhatTheSolverMovesIsNoChangeAndWhatSomebodyPutsIs) {
+TEST(WorldTextTest, SavesPlacedModelsAndIgnoresTheSolversMotion) {
   Text world(box("a", ""));
   named(world.models, "a").X_WM.translation.z() = -5e-4;
   EXPECT_EQ(world.saved(), world.text());
@@ -182,7 +182,7 @@ TEST(WorldTextTest, ANameThatASpawnMayHaveReadsBack) {
 }
 
 // What stands in a declaration or a comment is no model, whatever it looks like.
-TEST(WorldTextTest, TheModelIsTheOneThatTheParserSees) {
+TEST(WorldTextTest, IgnoresModelsInCommentsAndDeclarations) {
   for (const std::string before : {"<?xml version='1.0' x='><sdf><model name=\"i\"/></sdf>' ?>",
                                    "<!--><sdf><model name='i'/></sdf><!-- -->"}) {
     Text world(box("a", ""));
@@ -237,7 +237,7 @@ TEST(WorldTextTest, AUrdfThatWasSpawnedIsWrittenAsSdf) {
   expect_near(world.put("u"), Pose::from_xyz_rpy({4, 0, 0}, {0, 0, 0}));
 }
 
-TEST(WorldTextTest, WhatIsRemovedAndComesBackIsAsItWas) {
+TEST(WorldTextTest, ARemovedAndRestoredModelIsUnchanged) {
   Text world(box("a", "      <pose>1 2 3 0 0 0</pose>\n") +
              "    <include><uri>model://p3dx</uri></include>\n");
   for (const char* name : {"a", "p3dx"}) {
@@ -247,7 +247,7 @@ TEST(WorldTextTest, WhatIsRemovedAndComesBackIsAsItWas) {
   EXPECT_EQ(world.saved(), world.text());
 }
 
-TEST(WorldTextTest, FramesThatMoveWithAModelDoNotMoveWhatStandsInThem) {
+TEST(WorldTextTest, MovingAModelsFrameMovesNoOtherModel) {
   Text world(box("table", "      <pose>5 0 0 0 0 0</pose>\n") +
              "    <frame name=\"top\" attached_to=\"table\"><pose>0 0 1 0 0 0</pose></frame>\n" +
              box("cup", "      <pose relative_to=\"top\">0.1 0 0 0 0 0</pose>\n") +
@@ -268,7 +268,7 @@ TEST(WorldTextTest, ASavedStateOfAMovedModelIsDropped) {
   expect_near(world.put("b"), Pose::from_xyz_rpy({2, 2, 0}, {0, 0, 0}));
 }
 
-TEST(WorldTextTest, SaysWhatTheFileCannotSay) {
+TEST(WorldTextTest, ReportsPosesThatTheFileCannotHold) {
   Text world(box("a", "") +
              "    <ruedo:fleet name=\"r\"><include><uri>model://p3dx</uri></include>"
              "<ruedo:count>3</ruedo:count></ruedo:fleet>\n");
@@ -322,7 +322,7 @@ TEST(WorldTextTest, SaysWhichFoldersAWorldElsewhereDoesNotFind) {
             (std::set<std::string>{folder / "one/worlds/a", folder / "one/worlds/models"}));
 }
 
-TEST(WorldTextTest, PathsMayHoldWhatXmlEscapes) {
+TEST(WorldTextTest, PathsMayHoldCharactersThatXmlEscapes) {
   const auto folder = folder_with("escaped", {"a & <b>/c & d.dae"});
   EXPECT_EQ(
       moved_to("<sdf><uri> c &amp; d.dae\n</uri></sdf>", folder / "a & <b>/w.sdf", folder / "w.sdf")

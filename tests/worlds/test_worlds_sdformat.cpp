@@ -42,7 +42,7 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
 }
 
 // A world as `ruedo edit` saves it: with moved, added and removed models.
-TEST(LibsdformatText, ReadsWhatTheEditorSaves) {
+TEST(LibsdformatText, ReadsSavedWorldsOfTheEditor) {
   using ruedo::Pose;
   const auto world = ruedo::world::load_world(kWorlds + "arena.sdf");
   std::vector<ruedo::world::ModelNow> models;

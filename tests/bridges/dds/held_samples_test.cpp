@@ -97,7 +97,7 @@ TEST(HeldSamples, WithImpossibleNumbersOrOfTooManyWritersBecomeNothing) {
   EXPECT_EQ(bytes[20 + 32 * kMostWritersInDatagram], 0xff);
 }
 
-TEST(HeldSamples, AreDroppedByAHeartbeatThatHasNoneOfThem) {
+TEST(HeldSamples, AHeartbeatWithoutThemDropsThem) {
   Bytes out(100);
   ASSERT_EQ(write_dropped({gid(7, kWriter), (int64_t{5} << 32) - 1}, out), 52u);
   out.resize(52);
@@ -128,7 +128,7 @@ TEST(HeldSamples, GiveWayInTheirOrder) {
   EXPECT_FALSE(held.overdue());
 }
 
-TEST(HeldSamples, AWriterInOrderIsSeldomToldOf) {
+TEST(HeldSamples, ReportsAnOrderlyWriterSeldom) {
   HeldSamples held;
   size_t told = 0;
   for (int64_t i = 1; i <= 2'000'000; ++i) {  // 4 of kMostHeld
@@ -138,7 +138,7 @@ TEST(HeldSamples, AWriterInOrderIsSeldomToldOf) {
   EXPECT_LT(told, 200u);
 }
 
-TEST(HeldSamples, WhatNobodySentIsNotHeld) {
+TEST(HeldSamples, IgnoresBytesWithoutAWriter) {
   HeldSamples held;
   held.add(2 * kMostHeld, {});
   EXPECT_FALSE(held.overdue());

@@ -113,7 +113,7 @@ TEST(Identity, OfARequestInASharedMessageIsItsOwnParticipants) {
 }
 
 // Every truncated message, and every message with one changed byte, is read without a fault.
-TEST(Identity, OfDamagedMessagesIsNone) {
+TEST(Identity, DamagedMessagesHaveNoIdentity) {
   const Bytes message = joined({kHeader, data(7, joined({kRelated, kSentinel}))});
   for (size_t size = 0; size < message.size(); ++size)
     identity_in(std::span(message).first(size), kHeader.size());

@@ -62,7 +62,7 @@ std::vector<std::pair<int, uint32_t>> bounded(std::vector<Bytes> parts) {
 
 constexpr uint32_t kAll = 0xffffffff;
 
-TEST(Incoming, FragmentsOfWhatIsAllowedStay) {
+TEST(Incoming, KeepsFragmentsOfAllowedSamples) {
   for (const bool little : {true, false}) {
     EXPECT_THAT(bounded({fragment(1344, 4u << 20, 1344, little), fragment(512, 1000, 488, little)}),
                 ElementsAre(std::pair(0x16, 4u << 20), std::pair(0x16, 1000u)));

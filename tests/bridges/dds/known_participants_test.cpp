@@ -135,7 +135,7 @@ TEST_F(KnownParticipantsTest, OneSocketHasItsShare) {
   EXPECT_EQ(known_.size(), kMostOfOneSocket + 1);
 }
 
-TEST_F(KnownParticipantsTest, TheMostSilentGivesWayWhereThereIsNoRoom) {
+TEST_F(KnownParticipantsTest, DropsTheMostSilentParticipantWhenFull) {
   for (uint32_t i = 0; i < kMostParticipants; ++i) {
     EXPECT_TRUE(comes(i, static_cast<uint16_t>(i)));
     now_ += 1ms;
@@ -146,7 +146,7 @@ TEST_F(KnownParticipantsTest, TheMostSilentGivesWayWhereThereIsNoRoom) {
   EXPECT_EQ(known_.size(), kMostParticipants);
 }
 
-TEST_F(KnownParticipantsTest, WhoLeavesGivesWayFirst) {
+TEST_F(KnownParticipantsTest, DropsLeavingParticipantsFirst) {
   for (uint32_t i = 0; i < kMostOfOneSocket; ++i) EXPECT_TRUE(comes(i, 1));
   EXPECT_TRUE(passes(from(prefix(5), {leaving(prefix(5))})));
   EXPECT_TRUE(comes(1000, 1));
@@ -157,14 +157,14 @@ TEST_F(KnownParticipantsTest, WhoLeavesGivesWayFirst) {
   EXPECT_TRUE(comes(6, 1));  // it may come again at once
 }
 
-TEST_F(KnownParticipantsTest, WhatIsRepeatedAtOnceIsPassedOver) {
+TEST_F(KnownParticipantsTest, IgnoresRepetitionsWithinTheRepeatTime) {
   EXPECT_TRUE(comes(1, 1));
   EXPECT_FALSE(comes(1, 1));
   now_ += KnownParticipants::kRepeat;
   EXPECT_TRUE(comes(1, 1));
 }
 
-TEST_F(KnownParticipantsTest, NobodyTellsOfOthers) {
+TEST_F(KnownParticipantsTest, RejectsAnnouncementsOfOtherParticipants) {
   const Prefix own = prefix(1), other = prefix(2);
   for (const bool little : {true, false}) {
     EXPECT_FALSE(passes(from(own, {announcement(other, little)})));
@@ -195,7 +195,7 @@ TEST_F(KnownParticipantsTest, ParticipantsShareAMessage) {
   EXPECT_TRUE(last_passes(from(first, {submessage(0x0c, 0, Bytes(19)), endpoint(first, 0x0303)})));
 }
 
-TEST_F(KnownParticipantsTest, WhatIsToldToOthersMeansNothing) {
+TEST_F(KnownParticipantsTest, IgnoresMessagesToOtherParticipants) {
   const Prefix own = prefix(1);
   known_.serve(prefix(9));
   const auto leaves_to = [&](const Prefix& whom) {
@@ -210,7 +210,7 @@ TEST_F(KnownParticipantsTest, WhatIsToldToOthersMeansNothing) {
   EXPECT_TRUE(leaves_to(Prefix{}));
 }
 
-TEST_F(KnownParticipantsTest, ToHaveLeftIsSaidBesideTheDataOnly) {
+TEST_F(KnownParticipantsTest, IgnoresALeavingFlagInTheData) {
   // In the data, that parameter means nothing.
   const Prefix own = prefix(1);
   EXPECT_TRUE(passes(from(own, {data(kAnnouncer, 1,
@@ -219,7 +219,7 @@ TEST_F(KnownParticipantsTest, ToHaveLeftIsSaidBesideTheDataOnly) {
   EXPECT_EQ(known_.size(), 1u);
 }
 
-TEST_F(KnownParticipantsTest, WhatCannotBeReadIsNotLetIn) {
+TEST_F(KnownParticipantsTest, RejectsTruncatedAnnouncements) {
   const Prefix own = prefix(1);
   const Bytes good = announcement(own);
   for (size_t size = 4; size < good.size(); ++size) {
@@ -234,7 +234,7 @@ TEST_F(KnownParticipantsTest, WhatCannotBeReadIsNotLetIn) {
   EXPECT_FALSE(passes(from(own, {endpoint(own, 0x0103, kMostTold)})));
 }
 
-TEST_F(KnownParticipantsTest, WhoHasTheMostEndpointsGivesWay) {
+TEST_F(KnownParticipantsTest, DropsTheParticipantWithTheMostEndpoints) {
   EXPECT_TRUE(comes(1, 1) && comes(2, 2));
   uint32_t entity = 0;
   uint64_t sequence = 0;
@@ -320,7 +320,7 @@ TEST_F(KnownParticipantsTest, FragmentsThatTellAreBounded) {
   EXPECT_TRUE(fragment_of(1, 4000));  // is sent again
 }
 
-TEST_F(KnownParticipantsTest, ToLeaveIsSaidAsParticipantsDo) {
+TEST_F(KnownParticipantsTest, WritesTheLeavingMessageOfAParticipant) {
   Bytes out(200);
   const size_t size = write_left(prefix(5), out);
   out.resize(size);

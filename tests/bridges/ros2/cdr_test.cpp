@@ -32,7 +32,7 @@ TEST(Cdr, AnEmptySequenceAlignsNothing) {
   EXPECT_THAT(out.bytes(), ElementsAre(0, 1, 0, 0, 0, 0, 0, 0, 1));
 }
 
-TEST(Cdr, ReadsWhatItWrote) {
+TEST(Cdr, ReadsBackWrittenValues) {
   CdrWriter out;
   const double values[] = {1.5, -2.5};
   out.put(true).put(int64_t{-5}).put("text").put_sequence(std::span<const double>(values));
@@ -74,7 +74,7 @@ TEST(Cdr, EveryCutIsSeen) {
   }
 }
 
-TEST(Cdr, LengthsThatLieAllocateNothing) {
+TEST(Cdr, ForgedLengthsAllocateNothing) {
   const uint8_t bytes[] = {0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4};
   CdrReader text(bytes), numbers(bytes), texts(bytes);
   EXPECT_EQ(text.get_text(), "");

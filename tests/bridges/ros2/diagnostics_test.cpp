@@ -59,7 +59,7 @@ TEST(Diagnostics, TellOfTheLastSecond) {
   EXPECT_EQ(status["ruedo: ROS 2"].level, 0);
 }
 
-TEST(Diagnostics, WarnInTheSecondInWhichMessagesWereLost) {
+TEST(Diagnostics, WarnInTheSecondOfALoss) {
   const auto begin = Diagnostics::Clock::now();
   Diagnostics diagnostics(begin);
   const auto level = [&](int second, const HealthCounts& counts) {
@@ -74,7 +74,7 @@ TEST(Diagnostics, WarnInTheSecondInWhichMessagesWereLost) {
   EXPECT_EQ(level(6, {.missed = 1, .dropped = 1, .faulty = 1}), 0);
 }
 
-TEST(Diagnostics, ARunThatStandsStillSaysSo) {
+TEST(Diagnostics, ReportAPausedRun) {
   Diagnostics diagnostics;
   const auto message = diagnostics.look(Diagnostics::Clock::now() + milliseconds(1100), {});
   ASSERT_TRUE(message);

@@ -35,7 +35,7 @@ TEST(FairQueue, ClientsTakeTurnsAndTheirOwnStayInOrder) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(FairQueue, WhoMayNotWaitsAlone) {
+TEST(FairQueue, ABlockedClientDelaysNoOther) {
   Queue queue;
   queue.push(1, 11);
   queue.push(2, 21);

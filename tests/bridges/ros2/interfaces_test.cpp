@@ -111,7 +111,7 @@ TEST(Interfaces, TypesHaveTheirNamesInDds) {
   EXPECT_EQ(dds_type("std_srvs/srv/SetBool_Request"), "std_srvs::srv::dds_::SetBool_Request_");
 }
 
-TEST(Interfaces, TextsNameWhatTheyUseOnce) {
+TEST(Interfaces, TextsListEachUsedTypeOnce) {
   const std::string text = full_text("geometry_msgs/msg/TwistStamped", Distro::jazzy);
   EXPECT_TRUE(text.starts_with("std_msgs/Header header\nTwist twist\n====")) << text;
   const std::string once = "MSG: geometry_msgs/Vector3\n";
@@ -119,7 +119,7 @@ TEST(Interfaces, TextsNameWhatTheyUseOnce) {
   EXPECT_EQ(text.find(once), text.rfind(once));
 }
 
-TEST(Interfaces, AnUnknownReleaseIsNamed) {
+TEST(Interfaces, RejectsAnUnknownRelease) {
   EXPECT_EQ(parse_distro("kilted"), Distro::kilted);
   EXPECT_THROW(parse_distro("noetic"), InputError);
 }

@@ -132,7 +132,7 @@ std::shared_ptr<const run::Announcement> announcement(std::vector<world_info_t> 
   return announcement;
 }
 
-TEST(Node, WantsPicturesThatSomebodyReads) {
+TEST(Node, WantsOnlyPicturesWithReaders) {
   const auto shared = std::make_shared<Middleware>();
   Node node({}, std::make_unique<FakeTransport>(shared), {robot_with_a_camera()},
             [](const std::string&, std::span<const uint8_t>) {});
@@ -154,7 +154,7 @@ TEST(Node, WantsPicturesThatSomebodyReads) {
   EXPECT_FALSE(node.wants("p3at/camera"));
 }
 
-TEST(Node, TellsWhatAnotherRobotOfTheNameIsLike) {
+TEST(Node, PublishesTheDescriptionOfAReplacedRobot) {
   const auto shared = std::make_shared<Middleware>();
   RobotFrames frames;
   frames.description = "<robot name='first'/>";
@@ -331,7 +331,7 @@ TEST(Node, PublishesFramesWithPrefixesAndInNamespaces) {
   EXPECT_EQ(of_scan, "p3at/lrf");
 }
 
-TEST(Node, CommandsTheRobotWhoseNameInRosItIs) {
+TEST(Node, CommandsTheRobotOfTheRosName) {
   const auto shared = std::make_shared<Middleware>();
   NodeOptions options;
   options.joints = [](const std::string&) { return std::vector<std::string>{"a"}; };

@@ -52,7 +52,7 @@ struct FakeRun {
   }
 };
 
-TEST(Requests, WhoAsksMuchHasItsShare) {
+TEST(Requests, LimitsTheRequestsOfOneClient) {
   FakeRun run;
   run.join();
   for (int i = 0; i < 100; ++i) run.ask(1, 1);
@@ -88,7 +88,7 @@ TEST(Requests, StepsThatTakeForEverLeaveRoom) {
   EXPECT_EQ(run.got.size(), Requests::kMostSteps + 1);
 }
 
-TEST(Requests, WhatWasNotAnsweredIsAskedAgain) {
+TEST(Requests, RepeatsUnansweredRequests) {
   FakeRun run;
   // However long this thread is held up between its calls.
   const auto before = Requests::Clock::now();
@@ -136,7 +136,7 @@ TEST(Requests, ALostSessionOrRequestCostsNoAnswer) {
   EXPECT_EQ(run.answers, std::vector<int32_t>(2, reply_t::OK));
 }
 
-TEST(Requests, WhatTheRunDroppedIsAskedOnceMore) {
+TEST(Requests, RepeatsADroppedRequestOnce) {
   FakeRun run;
   run.join();
   run.ask(1, 1);
@@ -147,7 +147,7 @@ TEST(Requests, WhatTheRunDroppedIsAskedOnceMore) {
   EXPECT_EQ(run.answers, std::vector<int32_t>{reply_t::OLD_SEQUENCE});
 }
 
-TEST(Requests, WhoMayNotJoinIsTold) {
+TEST(Requests, ReportsARefusedJoin) {
   FakeRun run;
   run.ask(1);
   run.answer(run.got[0], reply_t::REFUSED);

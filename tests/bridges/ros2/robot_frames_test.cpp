@@ -59,7 +59,7 @@ TEST(RobotFrames, ALinkWithANameOfAnotherFrameIsCalledAnother) {
   EXPECT_EQ(frame(robot, "eye_link").joint, 2);               // the sensor is called eye
 }
 
-TEST(RobotFrames, LieInTheJointsThatMoveThem) {
+TEST(RobotFrames, LieAtTheirJoints) {
   const RobotFrames robot = frames_of(kRobot);
   const LinkFrame& eye = frame(robot, "eye_link");
   expect_at(eye.at(0), 0, 0, 0.7);  // in base_link_link
@@ -79,7 +79,7 @@ TEST(RobotFrames, AWheelAheadTurnsItsJointAsItsAxisHasIt) {
   EXPECT_EQ(robot.frames[robot.wheels[0].frame].name, "left");
 }
 
-TEST(RobotFrames, WhatUrdfHasNoShapeForIsLeftOutAndSaid) {
+TEST(RobotFrames, LeaveOutShapesThatUrdfLacksWithAComment) {
   const std::string text = frames_of(kRobot).description;
   EXPECT_THAT(text, HasSubstr("<!-- visual cap: URDF has no such shape -->"));
   EXPECT_THAT(text, HasSubstr("<!-- visual a __ b: URDF has no such shape -->"));
@@ -89,7 +89,7 @@ TEST(RobotFrames, WhatUrdfHasNoShapeForIsLeftOutAndSaid) {
   EXPECT_THAT(text, Not(HasSubstr("nan")));
 }
 
-TEST(RobotFrames, LinksAboveTheOneThatCarriesBaseLinkHangBelowIt) {
+TEST(RobotFrames, ParentsOfTheBaseLinkHangBelowIt) {
   const RobotFrames robot = frames_of(R"(
     <sdf version='1.9' xmlns:ruedo='urn:ruedo'><world name='w'><model name='bot'>
       <link name='top'><pose>0 0 2 0 0 0</pose></link>

@@ -66,7 +66,7 @@ TEST_F(Lifetimes, HandlesOutliveTheirSimulation) {
   EXPECT_EQ(odometry.channel(), "p3at/odometry");
 }
 
-TEST_F(Lifetimes, AfterCloseEveryRequestSaysSo) {
+TEST_F(Lifetimes, RequestsFailAfterClose) {
   Simulation sim = simulation(server);
   sim.close();
   sim.close();
@@ -92,7 +92,7 @@ TEST_F(Lifetimes, AfterCloseEveryRequestSaysSo) {
   EXPECT_EQ(sim.world(), "memory");
 }
 
-TEST_F(Lifetimes, OneThatWasMovedFromSaysTheSame) {
+TEST_F(Lifetimes, RequestsOfAMovedSimulationFail) {
   Simulation sim = simulation(server);
   Simulation other = std::move(sim);
   const std::string closed = "this simulation was closed";
@@ -104,7 +104,7 @@ TEST_F(Lifetimes, OneThatWasMovedFromSaysTheSame) {
   EXPECT_EQ(sim.world(), "memory");
 }
 
-TEST_F(Lifetimes, CloseWakesThoseWhoWait) {
+TEST_F(Lifetimes, CloseWakesWaitingThreads) {
   Simulation sim = simulation(server);
   auto waiting = std::async(std::launch::async, [&] {
     return error_of([&] { sim.robot("p3at").odometry().next(kPatience); });
@@ -184,7 +184,7 @@ TEST_F(Lifetimes, ACallbackMayDestroyTheSimulation) {
   EXPECT_FALSE(sim);
 }
 
-TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
+TEST_F(Lifetimes, CloseInACallbackRepeatsLeaveUntilItsReply) {
   server->lost_leaves = 2;
   Simulation sim = simulation(server);
   sim.pause();
@@ -385,7 +385,7 @@ std::string first_line_of_stderr(const std::function<void()>& meanwhile) {
   return line;
 }
 
-TEST_F(Lifetimes, ACallbackThatDoesNotReturnIsNamed) {
+TEST_F(Lifetimes, ReportsACallbackThatDoesNotReturn) {
   for (const bool by_subscription : {true, false}) {
     Simulation sim = simulation(server);
     std::promise<void> here, go_on;
@@ -407,7 +407,7 @@ TEST_F(Lifetimes, ACallbackThatDoesNotReturnIsNamed) {
   }
 }
 
-TEST_F(Lifetimes, ACallbackThatWaitsIsToldSoAtOnce) {
+TEST_F(Lifetimes, WaitingInACallbackFailsAtOnce) {
   const Simulation sim = simulation(server);
   const Robot robot = sim.robot("p3at");
   const auto odometry = robot.odometry();
@@ -443,7 +443,7 @@ TEST_F(Lifetimes, ACallbackThatWaitsIsToldSoAtOnce) {
                              testing::Each(testing::StartsWith("a callback cannot wait"))));
 }
 
-TEST_F(Lifetimes, TheChildOfAForkIsToldAndEndsNothing) {
+TEST_F(Lifetimes, AForkedChildCannotUseOrEndTheSimulation) {
   auto sim = std::make_unique<Simulation>(simulation(server));
   const Robot robot = sim->robot("p3at");
   const auto odometry = robot.odometry();
@@ -470,7 +470,7 @@ TEST_F(Lifetimes, TheChildOfAForkIsToldAndEndsNothing) {
   EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the parent's goes on
 }
 
-TEST_F(Lifetimes, WhatNoServerTakesIsRefusedAtOnce) {
+TEST_F(Lifetimes, RefusesInvalidArgumentsAtOnce) {
   const Simulation sim = simulation(server);
   SpawnOptions options;
   options.text = "<sdf>" + std::string(size_t{5} << 20, 'x');
@@ -506,7 +506,7 @@ TEST_F(Lifetimes, ACallbackOfANewRunMayDestroyTheSimulation) {
   EXPECT_FALSE(sim);
 }
 
-TEST_F(Lifetimes, WhatACallbackThrowsTheNextCallThrowsAndItHurtsNobody) {
+TEST_F(Lifetimes, TheNextCallRethrowsAnErrorOfACallback) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
   int heard = 0;
@@ -661,7 +661,7 @@ TEST_F(Lifetimes, AFalseTypeOutlastsNoInfo) {
   EXPECT_EQ(sim.robot("p3at").odometry().latest(kPatience).x, 1.0);
 }
 
-TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
+TEST_F(Lifetimes, UnknownMotionStatesReadAsUnknown) {
   const Simulation sim = simulation(server);
   const auto motion = sim.robot("p3at").motion();
   const Subscription told = motion.on_sample([](const MotionStatus&) {});

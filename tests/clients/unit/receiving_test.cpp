@@ -63,7 +63,7 @@ class Receiving : public testing::Test {
   std::vector<std::string> told;
 };
 
-TEST_F(Receiving, GoesOnBesideACallbackThatDoesNotReturn) {
+TEST_F(Receiving, ContinuesBesideACallbackThatDoesNotReturn) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
   const Subscription blocked = block(odometry);
@@ -118,7 +118,7 @@ TEST_F(Receiving, InLockstepCallbacksMissNothing) {
   EXPECT_EQ(odometry.dropped(), 0);
 }
 
-TEST_F(Receiving, AReaderCountsWhatItSkippedAndWhatWasLost) {
+TEST_F(Receiving, AReaderCountsSkippedAndLostSamples) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();  // 50 Hz
   const Subscription listening = odometry.on_sample([](const Odometry&) {});
@@ -149,7 +149,7 @@ TEST_F(Receiving, ADamagedMessageIsTheReadersErrorOnce) {
   EXPECT_EQ(calls, 1);
 }
 
-TEST_F(Receiving, WhatComesNextIsNotFromBeforeTheEndOfAMotion) {
+TEST_F(Receiving, NextAfterAMotionReturnsANewerSample) {
   const Simulation sim = simulation(server);
   const Robot robot = sim.robot("p3at");
   const auto odometry = robot.odometry();
@@ -186,7 +186,7 @@ TEST_F(Receiving, APrimitiveGoesOutAgainUntilAStatusShowsIt) {
   EXPECT_EQ(server->heard("p3at/move"), shown + 1);
 }
 
-TEST_F(Receiving, TicksRepeatWhatIsHeldAtTheDriversPeriodOfSimTime) {
+TEST_F(Receiving, TicksRepeatTheVelocityAtTheDriversPeriod) {
   const Simulation sim = simulation(server);
   sim.robot("p3at").set_velocity(0.1, 0.0);  // the watchdog has 40 ms: every 10 ms
   const int64_t before = server->heard("p3at/velocity");
@@ -197,7 +197,7 @@ TEST_F(Receiving, TicksRepeatWhatIsHeldAtTheDriversPeriodOfSimTime) {
   EXPECT_LT(repeated, 1000);
 }
 
-TEST_F(Receiving, TheServerIsToldOnceCallbacksHaveSeenWhatCame) {
+TEST_F(Receiving, ReportsProgressAfterItsCallbacks) {
   const Simulation sim = simulation(server);
   tell();
   const auto odometry = sim.robot("p3at").odometry();
@@ -216,7 +216,7 @@ TEST_F(Receiving, TheServerIsToldOnceCallbacksHaveSeenWhatCame) {
   EXPECT_THAT(lines(), testing::ElementsAre(first, "0 40000 " + std::to_string(kNever) + "\n"));
 }
 
-TEST_F(Receiving, TheServerIsToldWhoWorksWithWhatItKnows) {
+TEST_F(Receiving, ReportsThreadsThatUseASample) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
   const Subscription listening = odometry.on_sample([](const Odometry&) {});
@@ -288,7 +288,7 @@ TEST(Progress, AProgramIsWaitedForUntilItsFirstCall) {
   }
 }
 
-TEST(CallbackQueues, WhoBorrowsRunsWhatComesAndWaitsForWhatRuns) {
+TEST(CallbackQueues, ABorrowerRunsNewCallsAndWaitsForTheRunningOne) {
   CallbackQueue queue;
   queue.start();
   std::promise<void> here, go_on;

@@ -49,7 +49,7 @@ class ServerProcesses : public testing::Test {
   LaunchOptions options;
 };
 
-TEST_F(ServerProcesses, AForksChildKeepsNoneAlive) {
+TEST_F(ServerProcesses, AForkedChildKeepsNoServerAlive) {
   ServerProcess server("world", options);
   const pid_t child = fork();
   if (child == 0) {
@@ -61,14 +61,14 @@ TEST_F(ServerProcesses, AForksChildKeepsNoneAlive) {
   waitpid(child, nullptr, 0);
 }
 
-TEST_F(ServerProcesses, OneThatIsAwaitedElsewhereHasEnded) {
+TEST_F(ServerProcesses, AServerReapedElsewhereCountsAsEnded) {
   signal(SIGCHLD, SIG_IGN);
   ServerProcess server("world", options);
   EXPECT_EQ(ended(server), "the server ended (exit code unknown)");
   signal(SIGCHLD, SIG_DFL);
 }
 
-TEST_F(ServerProcesses, IsToldThatThisClientKeepsUpFromTheStart) {
+TEST_F(ServerProcesses, ReportsFromTheStartThatThisClientKeepsUp) {
   ServerProcess server("world", options);
   server.tell("0 20000 40000\n");
   EXPECT_EQ(ended(server), "the server ended (exit code 7)");
@@ -78,7 +78,7 @@ TEST_F(ServerProcesses, IsToldThatThisClientKeepsUpFromTheStart) {
             "0 0 9223372036854775807\n0 20000 40000\n");
 }
 
-TEST_F(ServerProcesses, OneThatReadsNothingHoldsNobodyUp) {
+TEST_F(ServerProcesses, AServerThatReadsNothingDelaysNoClient) {
   set_program("sleep 1");
   ServerProcess server("world", options);
   for (int i = 0; i < 100'000; ++i) server.tell("0 " + std::to_string(i) + " 0\n");
@@ -86,7 +86,7 @@ TEST_F(ServerProcesses, OneThatReadsNothingHoldsNobodyUp) {
   EXPECT_EQ(ended(server), "the server ended (exit code 7)");
 }
 
-TEST_F(ServerProcesses, ItsWarningsAreSaidOnce) {
+TEST_F(ServerProcesses, ReportsEachWarningOnce) {
   set_program(
       "echo a result\n"
       "{ echo 'ruedo: info: ready'; echo 'ruedo: a lamp'; echo 'ruedo: a lamp'; } >&2\n"

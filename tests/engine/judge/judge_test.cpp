@@ -130,7 +130,7 @@ Expectations goal(double x, double y, double radius, double by_s) {
   return expected;
 }
 
-TEST_F(JudgeTest, NoStepIsNoPass) {
+TEST_F(JudgeTest, WithoutAStepNothingIsJudged) {
   Expectations expected;
   expected.no_contact = true;
   expected.clearance = 0.1;
@@ -199,7 +199,7 @@ TEST_F(JudgeTest, EachGoalCounts) {
   }
 }
 
-TEST_F(JudgeTest, WhatCarriesTheRobotIsNoContact) {
+TEST_F(JudgeTest, TheGroundBelowIsNotAContact) {
   Expectations expected;
   expected.no_contact = true;
   const LinkIndex own(0), other(1);
@@ -223,7 +223,7 @@ TEST_F(JudgeTest, WhatCarriesTheRobotIsNoContact) {
   EXPECT_EQ(outcome("contact"), Outcome::failed);
 }
 
-TEST_F(JudgeTest, WhatPressesFromAboveOrFromTheSideIsAContact) {
+TEST_F(JudgeTest, TouchesFromAboveAndBesideAreContacts) {
   Expectations expected;
   expected.no_contact = true;
   for (const auto& [position, normal] :
@@ -252,7 +252,7 @@ TEST_F(JudgeTest, ClearanceIsTheSmallestDistance) {
   EXPECT_THAT(check.text, HasSubstr("0.400 m from box/link"));
 }
 
-TEST_F(JudgeTest, ADistanceIsToldWithTheDigitsThatFailIt) {
+TEST_F(JudgeTest, ReportsADistanceWithTheDigitsThatFailIt) {
   Expectations expected;
   expected.clearance = 0.5;
   judge(expected);
@@ -261,7 +261,7 @@ TEST_F(JudgeTest, ADistanceIsToldWithTheDigitsThatFailIt) {
 }
 
 // Also without any expectation: what falls touches nothing, and may pass over a goal.
-TEST_F(JudgeTest, WhatFallsHasFailed) {
+TEST_F(JudgeTest, AFallingRobotFails) {
   judge({});
   RobotState& robot = state_.robots[RobotIndex(0)];
   robot.twist.linear = Vec3(0, 0, -4.9);
@@ -355,7 +355,7 @@ TEST_F(JudgeTest, ARobotThatAFaultCarriesAwayHasFailed) {
   }
 }
 
-TEST_F(JudgeTest, WhatARequestDoesElsewhereIsNamed) {
+TEST_F(JudgeTest, ReportsRequestsThatChangeTheRun) {
   judge({});
   see(0.0);
   see(0.0);
@@ -414,7 +414,7 @@ TEST_F(JudgeTest, OdometryBeginsWhereTheRobotDoesAndAtItsResets) {
   EXPECT_EQ(outcome("odometry"), Outcome::failed);
 }
 
-TEST_F(JudgeTest, OdometryThatIsNoNumberOrOfNoFrameIsOff) {
+TEST_F(JudgeTest, OdometryThatIsNotFiniteOrOfAnotherFrameFails) {
   for (const auto& [x, resets] :
        {std::pair(std::nan(""), 0), std::pair(std::numeric_limits<double>::infinity(), 0),
         std::pair(0.0, 7)}) {
@@ -454,7 +454,7 @@ TEST_F(JudgeTest, OdometryAfterSimTimeWasReset) {
   EXPECT_EQ(outcome("odometry"), Outcome::passed) << check("odometry").text;
 }
 
-TEST_F(JudgeTest, TheRobotIsTheOneThatIsNamed) {
+TEST_F(JudgeTest, JudgesTheRobotOfTheExpectation) {
   const std::string two = robot("a", "0 0 0 0 0 0") + robot("b", "3 0 0 0 0 0");
   Expectations expected = goal(3.0, 0.0, 0.1, 1.0);
   judge(expected, two);
@@ -507,7 +507,7 @@ TEST_F(JudgeTest, MetricsSayHowWellItWent) {
   EXPECT_NEAR(metrics().at("clearance_m"), 0.5, 1e-6);
 }
 
-TEST_F(JudgeTest, TheEvidenceOfClearanceIsWhatWasMeasured) {
+TEST_F(JudgeTest, ReportsTheMeasuredClearance) {
   Expectations expected;
   expected.clearance = 0.25;
   judge(expected);
@@ -532,7 +532,7 @@ TEST_F(JudgeTest, TheTrackIsEveryQuarterOfASecond) {
   }
 }
 
-TEST_F(JudgeTest, EachKindOfFailureIsTold) {
+TEST_F(JudgeTest, ReportsEachKindOfFailure) {
   Expectations expected;
   expected.no_contact = true;
   expected.clearance = 0.5;
@@ -544,7 +544,7 @@ TEST_F(JudgeTest, EachKindOfFailureIsTold) {
   EXPECT_EQ(outcome("clearance"), Outcome::failed);
 }
 
-TEST_F(JudgeTest, ACommandIsNoRequest) {
+TEST_F(JudgeTest, ACommandDoesNotCountAsARequest) {
   judge({});
   see(0.0);
   see(0.0);

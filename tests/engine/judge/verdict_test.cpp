@@ -23,7 +23,7 @@ TEST(Verdict, PassesOnEvidenceAlone) {
   EXPECT_EQ((Verdict{{kSteps, kNot, kSteps}, {}, {}}.evidence()), "12 steps; 12 steps");
 }
 
-TEST(Verdict, TellsFailuresInTheirOrder) {
+TEST(Verdict, ListsFailuresInOrderOfTime) {
   const Verdict verdict{{kLate, kNot, kSteps, kEarly, kClient}, {}, {}};
   std::vector<std::string> lines;
   for (const Check& check : verdict.failures()) lines.push_back(to_line(check));
