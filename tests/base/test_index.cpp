@@ -17,7 +17,7 @@ concept Comparable = requires(A a, B b) { a == b; };
 template <typename A, typename B>
 concept Ordered = requires(A a, B b) { a < b; };
 
-TEST(Index, OfAnotherKindDoesNotPass) {
+TEST(Index, AnIndexOfAnotherKindDoesNotCompile) {
   static_assert(Subscript<Bodies, BodyIndex>);
   static_assert(!Subscript<Bodies, LinkIndex>);
   static_assert(!Subscript<const Bodies, LinkIndex>);
@@ -28,7 +28,7 @@ TEST(Index, OfAnotherKindDoesNotPass) {
   static_assert(!std::is_assignable_v<BodyIndex&, LinkIndex>);
 }
 
-TEST(Index, ComesOutOfANumberOnlyWhereThatIsWritten) {
+TEST(Index, ConvertsFromNumbersOnlyExplicitly) {
   static_assert(!std::is_convertible_v<int, BodyIndex>);
   static_assert(std::is_constructible_v<BodyIndex, int>);
   static_assert(std::is_constructible_v<BodyIndex, size_t>);
@@ -37,14 +37,14 @@ TEST(Index, ComesOutOfANumberOnlyWhereThatIsWritten) {
   static_assert(!std::is_constructible_v<bool, BodyIndex>);  // 0 is an index
 }
 
-TEST(Index, OfNothingIsMinusOne) {
+TEST(Index, DefaultsToMinusOne) {
   EXPECT_FALSE(BodyIndex().valid());
   EXPECT_EQ(static_cast<int>(BodyIndex()), -1);
   EXPECT_TRUE(BodyIndex(0).valid());
   EXPECT_LT(BodyIndex(), BodyIndex(0));
 }
 
-TEST(IndexedVector, IsWalkedThroughByItsIndex) {
+TEST(IndexedVector, IteratesByItsIndex) {
   Bodies list{1.0, 2.0, 3.0};
   double sum = 0;
   for (const BodyIndex body : list.indices()) sum += list[body] * (body + 1);

@@ -152,7 +152,7 @@ TEST(Schema, SurvivesEveryByteChange) {
 }
 
 // However many rows of nothing there are, they are not counted one by one: these would take hours.
-TEST(Schema, RowsOfNothingTakeNoTime) {
+TEST(Schema, EmptyRowsTakeNoTime) {
   const fs::path file = fs::path(testing::TempDir()) / "rows_t.lcm";
   std::ofstream(file) << "struct rows_t { int32_t a; int32_t b; int32_t c; double value[a][b][c];"
                          " int8_t last; byte room[16000000]; }";

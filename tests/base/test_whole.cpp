@@ -47,7 +47,7 @@ std::string shown(double most) {
   return exponent < 6 ? std::to_string(static_cast<int>(most)) : "1e" + std::to_string(exponent);
 }
 
-TEST(Quantities, AreThoseOfTheDocumentation) {
+TEST(Quantities, EqualTheDocumentation) {
   std::ifstream in(RUEDO_SOURCE_DIR "/docs/limits.md");
   std::vector<std::string> rows;
   for (std::string line; std::getline(in, line);) rows.push_back(line);

@@ -149,7 +149,7 @@ TEST_F(Multicast, AFewMessagesOfEachSenderAreOnTheWay) {
 
 // Of which each sender says that 30 MB are to come: they cost what came, and none of the time and
 // memory that was announced.
-TEST_F(Multicast, AnnouncedSizesCostNothing) {
+TEST_F(Multicast, AnnouncedSizesAllocateNothing) {
   const auto pages = [] {
     rusage used{};
     ::getrusage(RUSAGE_SELF, &used);

@@ -194,7 +194,7 @@ TEST(TcpqServer, PassesRawPictures) {
   }
 }
 
-TEST(TcpqServer, ListensAnew) {
+TEST(TcpqServer, ChangesItsInputChannels) {
   Served served;
   Stock speaker(served.url);
   speaker.lcm.publish("in", "x", 1);

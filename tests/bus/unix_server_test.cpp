@@ -138,7 +138,7 @@ TEST(UnixServer, KnowsTheSubscribedChannels) {
   EXPECT_FALSE(bus.is_heard("a"));
 }
 
-TEST(UnixServer, IsTheUsersOwn) {
+TEST(UnixServer, IsPrivateToItsUser) {
   Served served;
   struct stat status{};
   ASSERT_EQ(::stat(served.folder.url().host.c_str(), &status), 0);
@@ -175,7 +175,7 @@ TEST(UnixServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
   while (served.server.connections() == 0) std::this_thread::yield();
 }
 
-TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
+TEST(UnixServer, ASlowClientLosesNothing) {
   Served served;
   Client slow(served, {"bulk"});
   const std::string block(60'000, 'x');
@@ -395,7 +395,7 @@ TEST(UnixServer, AcceptsAsSoonAsTheSocketExists) {
   EXPECT_TRUE(fs::is_empty(folder.path));
 }
 
-TEST(UnixServer, OfTwoThatBeginAtOnceOneServes) {
+TEST(UnixServer, OneOfTwoSimultaneousServersServes) {
   const Folder folder;
   const std::string path = folder.url().host;
   for (int round = 0; round < 500; ++round) {

@@ -20,7 +20,7 @@ const std::string kAddress =
     fmt::format("239.255.{}.{}:21907", getpid() / 256 % 256, getpid() % 256);
 const LcmUrl kUrl = parse_url("udpm://" + kAddress);
 
-TEST(UrlClaim, TheSecondHearsOfTheFirst) {
+TEST(UrlClaim, TheSecondServerSeesTheFirst) {
   EXPECT_EQ(claimed_by(kUrl), "");
   UrlClaim first(kUrl, "pid 1, world hall");
   first.describe("pid 1, world hall, run 77");

@@ -433,7 +433,7 @@ TEST_F(TapTest, KeepsTheNewestStateForLaterViewers) {
 }
 
 // A reply goes out while the request's own thread still shows the request: both are seen.
-TEST_F(TapTest, NothingIsMissedWhenTwoThreadsOfferInTheSameMoment) {
+TEST_F(TapTest, TwoThreadsOfferWithoutLoss) {
   constexpr int kEach = 20000;
   tap.watch(true);
   std::thread requests([&] {
@@ -445,7 +445,7 @@ TEST_F(TapTest, NothingIsMissedWhenTwoThreadsOfferInTheSameMoment) {
 }
 
 // A viewer that has just come, or just said what it wants, gets the reply to its next request.
-TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
+TEST_F(TapTest, AViewerMissesNothingAfterItsFirstMessage) {
   const auto world = std::make_shared<const world::WorldModel>();
   Stage stage;
   stage.source = std::make_unique<LiveSource>(tap,

@@ -115,7 +115,7 @@ TEST_F(LogDiffTest, IgnoredChannels) {
   EXPECT_THROW(diff({}, {"*"}), InputError) << "nothing is left that could differ";
 }
 
-TEST_F(LogDiffTest, ARuleForAFieldThatIsNotThere) {
+TEST_F(LogDiffTest, ARuleForAMissingField) {
   write_log(golden_, 0);
   write_log(other_, 0);
   const log::Diff result =
@@ -247,7 +247,7 @@ TEST_F(LogDiffTest, ARunsLogThatEndsBetweenTwoEventsIsCut) {
   }
 }
 
-TEST_F(LogDiffTest, NothingComparedIsNotTheSame) {
+TEST_F(LogDiffTest, AnEmptyComparisonDiffers) {
   const auto expect_nothing = [&](bool partial) {
     const log::Diff result = log::diff_logs(golden_, other_, {}, partial);
     EXPECT_FALSE(result.same());

@@ -80,7 +80,7 @@ TEST_F(HeightFields, ThingsFallBesideTheMap) {
 }
 
 // Rolling over many cells costs no height and no speed: edges between them are not felt.
-TEST_F(HeightFields, EdgesWithinAFlatMapAreNotFelt) {
+TEST_F(HeightFields, InnerEdgesOfAFlatMapDoNotCollide) {
   World w(ground(513, 257, [](double, double) { return 1.0; }) + ball(-5, 0.013, 0.5 + 1.0 + 0.1));
   w.run(0.2);
   const Vec3 ahead = Vec3(1, 0.37, 0).normalized();

@@ -98,7 +98,7 @@ TEST_F(Meshes, ABoxSlidesAsOnAPlane) {
 }
 
 // A kerb of 8 cm across the way: the ball comes back, or stays in front of it.
-TEST_F(Meshes, AnEdgeThatStandsOutIsFelt) {
+TEST_F(Meshes, AnOuterEdgeCollides) {
   World w(floor([](double x, double) { return x > 1.9 ? 0.08 : 0.0; }) +
               thing("r", "0.013 0.007 0.1 0 0 0", kBall, 1, 1.0, 0.004),
           5000);

@@ -282,7 +282,7 @@ TEST(Joints, EffortAccelerates) {
   EXPECT_EQ(w.physics.joint_effort(JointIndex(0)), 0.6);
 }
 
-TEST(Joints, AMotorHoldsAgainstGravityAndSaysItsEffort) {
+TEST(Joints, AMotorHoldsAgainstGravityAndReportsItsEffort) {
   World w(hinged("0 1 0"));  // the arm lies along x: 2 kg * 10 * 0.5 m = 10 N m, which y turns down
   w.physics.drive_joint_velocity(JointIndex(0), 0.0, 100.0);
   w.run(0.5);

@@ -83,7 +83,7 @@ void watch(const std::string& model, const std::string& what) {
   EXPECT_GT(sim.position().norm(), 0.3) << what;
 }
 
-TEST(BaseLink, IsWhereTheRobotSaysThatItIs) {
+TEST(BaseLink, IsAtThePublishedPose) {
   int robots = 0;
   for (const auto& entry : std::filesystem::directory_iterator(RUEDO_SOURCE_DIR "/worlds/robots")) {
     const auto file = entry.path() / "model.sdf";

@@ -68,7 +68,7 @@ TEST(Crowd, LikesToWalkAsPeopleDo) {  // 1.34 m/s in the mean, with a deviation 
   EXPECT_NEAR(std::sqrt(squares - sum * sum), 0.26, 0.05);
 }
 
-TEST(Crowd, TheSeedSaysAll) {
+TEST(Crowd, DependsOnTheSeedOnly) {
   const std::string text = plane_sdf() + crowd_sdf("a", 30, "-4 -4 4 4", "") +
                            crowd_sdf("b", 10, "-9 -9 -5 -5", goal("6 6"));
   const auto world = Sim(text).world;

@@ -68,7 +68,7 @@ void stand_on_flippers(Sim& sim) {
   ASSERT_NEAR(height(sim), kOnFlippers_m, 1e-3);
 }
 
-TEST(Flippers, DriveTheRobotThatStandsOnThem) {
+TEST(Flippers, DriveARobotThatStandsOnThem) {
   Sim sim(plane_sdf() + crawler(), 1000);
   EXPECT_TRUE(sim.world->findings.empty());
   stand_on_flippers(sim);

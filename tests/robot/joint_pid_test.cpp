@@ -118,7 +118,7 @@ TEST(JointPid, ItsEffortIsLimitedToBothSidesApart) {
   EXPECT_NEAR(machine.rate(), (0.3 - 0.1) / kJ, 1e-6);
 }
 
-TEST(JointPid, AnOffsetPushesWhereNothingIsMissing) {
+TEST(JointPid, AnOffsetPushesWithoutAnError) {
   Machine machine(::ruedo::robot::testing::machine(
       plugin("JointPositionController", pid(10.0, 0.0, 5.0) + gain("cmd_offset", 2.0))));
   machine.run(10.0);

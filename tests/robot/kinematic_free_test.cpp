@@ -241,7 +241,7 @@ struct Refused {
   int8_t reason;
 };
 
-TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
+TEST(Commands, RefusedOnesChangeNothingAndGiveAReason) {
   const double nan = std::nan(""), inf = INFINITY;
   const Refused table[] = {
       {{RobotIndex(0), VelocityCommand{nan, 0, 0}}, Status::REASON_NOT_FINITE},

@@ -77,7 +77,7 @@ int8_t refusal(const Sim& sim) {
                                        : sim.state.motion_ends.front().state.reason;
 }
 
-TEST(Lifts, GoToTheFloorThatIsCalledAndOpenThere) {
+TEST(Lifts, MoveToTheCommandedFloorAndOpenThere) {
   Sim sim(elevator(), 1000);
   EXPECT_TRUE(sim.world->findings.empty()) << sim.world->findings.front().text;
   sim.run(1.0);
@@ -274,7 +274,7 @@ TEST(Lifts, ReportMissingDoorsAndJoints) {
 }
 
 // A reset goes back to the start: the same motion, bit for bit.
-TEST(Lifts, BeginAnewWithTheirWorld) {
+TEST(Lifts, AreResetWithTheirWorld) {
   Sim sim(elevator(), 1000);
   const auto way = [&] {
     tell(sim, "lift", kFloor, 1);

@@ -50,7 +50,7 @@ double run_until_done(Sim& sim) {
 }
 
 // What a client sees when the primitive reports its end: the robot has arrived, and stands.
-TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
+TEST(Wheels, APrimitiveEndsAtItsGoalAndAtRest) {
   struct Case {
     double acceleration, deceleration, seconds;
   };  // of the plan: sqrt(2 s (1/a + 1/d))

@@ -46,7 +46,7 @@ TEST(Backpressure, ALongStepIsAllowed) {
   EXPECT_EQ(pressure.limits().at_highest_rate, 4);
 }
 
-TEST(Backpressure, WordsOfAnotherEpochCountForNothing) {
+TEST(Backpressure, IgnoresReportsOfAnotherEpoch) {
   Backpressure pressure(5'000);
   pressure.note_progress({0, 10'000'000});
   pressure.begin(1, 0);

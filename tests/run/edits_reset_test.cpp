@@ -28,7 +28,7 @@ class EditsResetTest : public testing::Test, public Controlled {
 
 std::string imu() { return "<sensor name='imu' type='imu'><update_rate>50</update_rate></sensor>"; }
 
-TEST_F(EditsResetTest, TheTimeAloneBeginsAnewAndNothingMoves) {
+TEST_F(EditsResetTest, AResetOfTheTimeMovesNothing) {
   begin(paused_server(),
         robot_sdf("r", 0, 0, imu()) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 2));
   drive("r", 0.5);
@@ -211,7 +211,7 @@ TEST_F(EditsResetTest, WaitsForARobotThatIsRemovedAndRestored) {
 }
 
 // Each is answered with its error; nothing stops, and nothing changes.
-TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
+TEST_F(EditsResetTest, HostileRequestsGetAnErrorText) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1));
   step(10);
   const state_reply_t before = state();

@@ -241,7 +241,7 @@ TEST_F(EditsTest, AnErrorInATextShowsNoFolder) {
   EXPECT_TRUE(reply.text.starts_with("the text:1: ")) << reply.text;
 }
 
-TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
+TEST_F(EditsTest, SetPoseLeavesModelsAtRest) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 0.1));
   drive("r", 0.5);
   step(100);

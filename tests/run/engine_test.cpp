@@ -143,7 +143,7 @@ TEST_P(EngineEqualsServer, ByteForByte) {
 
 INSTANTIATE_TEST_SUITE_P(Worlds, EngineEqualsServer, testing::Range(1u, 9u));
 
-TEST(Engine, ACopyThatIsResetIsAFreshOne) {
+TEST(Engine, AResetCopyEqualsAFreshOne) {
   std::mt19937 random(3);
   const auto world = load_text(random_models(random, 2));
   const std::vector<Command> before = random_commands(random, 2, 300),

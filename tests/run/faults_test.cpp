@@ -94,7 +94,7 @@ TEST(FaultsKeep, FrozenMessagesThatHaveRoom) {
   EXPECT_EQ(filter.kept(), 2 * kCost);
 }
 
-TEST(FaultsKeep, NothingOnceTheyHaveEnded) {
+TEST(FaultsKeep, NoMessagesAfterTheirEnd) {
   FaultFilter filter(5000);
   const std::vector<SensorFault> faults{fault(Kind::freeze, 1, 0, 5), fault(Kind::lag, 2, 5, 10),
                                         fault(Kind::clock_drift, 3, 0, 1000)};
@@ -198,7 +198,7 @@ class FaultsTest : public testing::Test {
 constexpr double kStep_s = 0.005;
 
 // Of sensors: the list that a batch gets has those that act on any of its steps.
-TEST_F(FaultsTest, OfSensorsMakeRoomWhenTheyHaveEnded) {
+TEST_F(FaultsTest, EndedSensorFaultsFreeTheirPlace) {
   const world::Fault short_one = made("dropout", "odometry", kStep_s, 0.0);
   for (int64_t step = 0; step < 3000; ++step) {
     ASSERT_TRUE(takes(short_one)) << step;
@@ -210,7 +210,7 @@ TEST_F(FaultsTest, OfSensorsMakeRoomWhenTheyHaveEnded) {
   EXPECT_FALSE(faults_.none());
 }
 
-TEST_F(FaultsTest, OfRobotsMakeRoomWhenTheyHaveEnded) {
+TEST_F(FaultsTest, EndedRobotFaultsFreeTheirPlace) {
   const world::Fault weak = made("weak_motor", "", kStep_s, 0.5),
                      kidnapped = made("kidnapped", "", 0.0, 0.0);
   for (int64_t step = 0; step < 3000; ++step) {

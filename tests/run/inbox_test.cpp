@@ -102,7 +102,7 @@ TEST_F(InboxTest, IsBounded) {
   EXPECT_EQ(apply(1).back(), 0.2);
 }
 
-TEST_F(InboxTest, TakesNothingLarge) {
+TEST_F(InboxTest, RefusesLargeMessages) {
   engine::CommandInbox wheels({{"r/wheels", RobotIndex(0), engine::Input::Kind::wheels}}, 1);
   wheel_command_t command{};
   command.n = 8000;

@@ -383,7 +383,7 @@ TEST_F(HostileGrants, WaitTheirTurn) {
             9);
 }
 
-TEST_F(HostileGrants, AllAtOnceGoesAsFarAsIsKept) {
+TEST_F(HostileGrants, GrantingEverythingAdvancesToTheKeptMessages) {
   const auto asked = [&](int64_t received) { return newest(*client_, received); };
   client_->send(request_t::GRANT, client_->next_sequence(),
                 engine::encoded(grant(4, 4 + kMostSteps, 4)));

@@ -108,7 +108,7 @@ TEST(Live, WaitsForTheMessagesOfAChannel) {
   EXPECT_EQ(world.gate.limit, 60);
 }
 
-TEST(Live, WaitsForNoRobotThatIsGone) {
+TEST(Live, DoesNotWaitForARemovedRobot) {
   FakeWorld world;
   Live live({{"r/velocity", {10, 1}}}, kStep_us);
   live.begin(world.stage(), -1);
@@ -483,7 +483,7 @@ TEST_F(RepeatingTest, KnowsItsLength) {
   EXPECT_EQ(progress->whole, 50);
 }
 
-TEST_F(RepeatingTest, SaysHowFarItIs) {
+TEST_F(RepeatingTest, ReportsItsProgress) {
   const Live after({}, kStep_us);
   Repeating repeating(file_.path(), &after);
   repeating.begin(world_.stage(), -1);
@@ -497,7 +497,7 @@ TEST_F(RepeatingTest, SaysHowFarItIs) {
   EXPECT_EQ(Progress::latest()->done, 20 + 7);
 }
 
-TEST_F(RepeatingTest, IsNotDisturbed) {
+TEST_F(RepeatingTest, IgnoresClients) {
   const Live after({}, kStep_us);
   Repeating repeating(file_.path(), &after);
   repeating.begin(world_.stage(), -1);

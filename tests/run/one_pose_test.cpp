@@ -202,7 +202,7 @@ TEST(OnePose, AllChannelsGiveThePoseOfBaseLink) {
 
 // REP-120: base_footprint is on the ground, and base_link where the file's fixed joint has it. The
 // robot's pose is that of base_footprint, if that is below the centre of rotation.
-TEST(OnePose, IsThatOfTheFootprintAndTheFilesJointAboveItIsKept) {
+TEST(OnePose, IsTheFootprintsAndKeepsTheJointAboveIt) {
   const std::string inertial =
       "<inertial><mass value='1'/><inertia ixx='0.1' iyy='0.1' izz='0.1' ixy='0' ixz='0' "
       "iyz='0'/></inertial>";

@@ -287,7 +287,7 @@ TEST_F(RestoreTest, AFileWithAByteChangedLeadsThereOrIsRefused) {
   EXPECT_FALSE(restore("here"));
 }
 
-TEST_F(RestoreTest, TheFileOfAStateThatWasPutBackLeadsThere) {
+TEST_F(RestoreTest, ASnapshotAfterARestoreLeadsToItsState) {
   start_paused();
   step(400);
   saved_ = save("first");
@@ -361,7 +361,7 @@ TEST_F(RestoreTest, ResimulatesALoggedRun) {
   EXPECT_EQ(go_on(), followed);
 }
 
-TEST_F(RestoreTest, OfManyTheNewestAreKept) {
+TEST_F(RestoreTest, KeepsTheNewestSnapshots) {
   start_paused();
   step(400);
   saved_ = save("0");
@@ -374,7 +374,7 @@ TEST_F(RestoreTest, OfManyTheNewestAreKept) {
   EXPECT_FALSE(restore("1"));
 }
 
-TEST_F(RestoreTest, ARunThatDoesNotStandStillIsSavedAndPutBack) {
+TEST_F(RestoreTest, SavesAndRestoresARunningRun) {
   start_paused();
   ask(request_t::RESUME);
   rate_request_t rate;
@@ -394,7 +394,7 @@ TEST_F(RestoreTest, ARunThatDoesNotStandStillIsSavedAndPutBack) {
 }
 
 // Hours away. The command that was read ahead does not act on what is there then.
-TEST_F(RestoreTest, APauseEndsTheWayToAStateThatIsFarAway) {
+TEST_F(RestoreTest, APauseCancelsALongResimulation) {
   start_paused();
   step(100);
   saved_ = save("far");

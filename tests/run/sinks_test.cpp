@@ -73,7 +73,7 @@ void send_step(Sink& sink, int64_t step, const std::vector<uint8_t>& bytes) {
   sink.flush();
 }
 
-TEST(QueuedSink, WaitsWhereNothingMayBeMissing) {
+TEST(QueuedSink, WaitsIfItMayLoseNothing) {
   Notes notes;
   std::vector<std::string> expected;
   {

@@ -198,7 +198,7 @@ TEST(SpawnWorker, InLockstepTheStepIsThatOfTheGrants) {
   EXPECT_EQ(decoded_as<state_reply_t>(reply.body).step, 100);
 }
 
-TEST(LoadBudget, IsSpent) {
+TEST(LoadBudget, RunsOut) {
   world::LoadBudget memory(std::chrono::seconds(1000), size_t{3} << 20);
   memory.take_time();
   memory.take_mesh(size_t{2} << 20);

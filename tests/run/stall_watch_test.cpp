@@ -116,7 +116,7 @@ std::string reason_of(RunOptions options, const std::string& inside, MemoryBus& 
   return told.wait();
 }
 
-TEST(StallWatch, NamesTheClientsThatLockstepWaitsFor) {
+TEST(StallWatch, ReportsTheClientsThatLockstepWaitsFor) {
   MemoryBus bus;
   Told told;
   RunOptions options = fast(1);
@@ -124,7 +124,7 @@ TEST(StallWatch, NamesTheClientsThatLockstepWaitsFor) {
   EXPECT_THAT(reason_of(options, "", bus, told), HasSubstr("it waits for 2 more of 2 clients"));
 }
 
-TEST(StallWatch, NamesTheChannelThatIsWaitedFor) {
+TEST(StallWatch, ReportsTheMissingChannel) {
   MemoryBus bus;
   Told told;
   RunOptions options = fast(1);
@@ -133,7 +133,7 @@ TEST(StallWatch, NamesTheChannelThatIsWaitedFor) {
               HasSubstr("the input of --wait-for, message 0 on r/velocity"));
 }
 
-TEST(StallWatch, NamesTheModuleThatIsAtWork) {
+TEST(StallWatch, ReportsTheBusyModule) {
   MemoryBus bus;
   Told told;
   RunOptions options = fast(1);

@@ -319,7 +319,7 @@ TEST_F(ControlTest, ControlOff) {
   }
 }
 
-TEST_F(ControlTest, TheLastWordOfARunSaysThatItHasEnded) {
+TEST_F(ControlTest, TheLastMessageOfARunReportsItsEnd) {
   begin(paused());
   join();
   const int64_t run_id = info().run_id;
@@ -334,7 +334,7 @@ TEST_F(ControlTest, TheLastWordOfARunSaysThatItHasEnded) {
   EXPECT_THAT(last.text, testing::StartsWith("the run has ended at step "));
 }
 
-TEST_F(ControlTest, WhereItMayBeLostTheLastWordIsRepeated) {
+TEST_F(ControlTest, RepeatsTheLastMessageOnALossyBus) {
   bus_.loses = true;
   begin(fast(0.1));
   wait();

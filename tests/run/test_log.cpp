@@ -84,7 +84,7 @@ TEST(Writer, ReportsAFullDisk) {
 }
 
 // However many bytes there is room for, the log ends with a complete event.
-TEST(Writer, ADiskThatIsFullAtAnyByteLeavesAWholeLog) {
+TEST(Writer, ADiskThatFillsAtAnyByteLeavesAReadableLog) {
   const uint8_t bytes[100] = {};
   constexpr int64_t kEvent = 28 + 7 + 100;  // head, channel, data
   for (rlim_t room = 0; room <= 5 * kEvent; room += 5) {
@@ -107,7 +107,7 @@ TEST(Writer, ADiskThatIsFullAtAnyByteLeavesAWholeLog) {
   }
 }
 
-TEST(Recording, NamesLibrariesThatAreNotLoadedYet) {
+TEST(Recording, ListsLibrariesThatAreNotLoadedYet) {
   const std::vector<std::string> before = log::libraries_that_matter();
   load_late_libraries();
   EXPECT_EQ(before, log::libraries_that_matter());

@@ -55,7 +55,7 @@ TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
   EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);  // its place is taken
 }
 
-TEST(WorldEditor, SpawnsWhereTheRequestSays) {
+TEST(WorldEditor, SpawnsAtTheRequestedPose) {
   spawn_request_t request{};
   request.position[0] = 1.0;
   request.position[2] = 0.5;

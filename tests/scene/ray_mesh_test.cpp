@@ -144,7 +144,7 @@ TEST(RayMesh, IgnoresDegenerateTriangles) {
             3.0);  // along the triangle that is a line
 }
 
-TEST(RayMesh, EmptyMeshIsNothing) {
+TEST(RayMesh, AnEmptyMeshIsNeverHit) {
   const Alone alone(std::make_shared<world::Mesh>(), {}, true);
   EXPECT_FALSE(alone.scene->cast({{-4, 0, 0}, {1, 0, 0}}).hit());
 }

@@ -193,7 +193,7 @@ TEST(RayScene, BadRaysHitNothing) {
   EXPECT_TRUE(scenes.fast->cast({{-1e9, 0, 0}, {1, 0, 0}}).hit());
 }
 
-TEST(RayScene, MoversWithoutAPlaceAreNotThere) {
+TEST(RayScene, MoversWithANanPoseAreNotHit) {
   Scenes scenes;
   scenes.world.add(at({5, 0, 0}), geometry(Shape::sphere, {1, 0, 0}), false);
   scenes.world.add(at({9, 0, 0}), geometry(Shape::sphere, {1, 0, 0}), false);

@@ -101,7 +101,7 @@ TEST(RenderScene, FarDepthKeepsItsPrecision) {
   }
 }
 
-TEST(RenderScene, NearerThanTheClipHidesAndFartherIsNotSeen) {
+TEST(RenderScene, HidesBeforeTheNearClipAndBeyondTheFarClip) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   World w;
   w.box("near", {0.5, 0, 1}, {0.2, 0.1, 0.1}, kRed);
@@ -528,7 +528,7 @@ TEST(RenderScene, ShadowsAreThoseOfTheStep) {
 
 // Of what moves only that is drawn into the map whose shadow a view may show; of what stands still
 // all is.
-TEST(RenderScene, ShadowsOfMoversAreThoseOfThingsThatStandStill) {
+TEST(RenderScene, ShadowsOfMoversEqualThoseOfStaticModels) {
   const auto picture = [](bool is_static, double yaw, double pitch) {
     World w;
     world::Light sun;

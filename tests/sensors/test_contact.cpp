@@ -81,7 +81,7 @@ struct Bench {
   Snapshot now;
 };
 
-TEST(ContactSensor, TouchesNothing) {
+TEST(ContactSensor, IsNotPressedWithoutAContact) {
   Bench bench("");
   const contact_t m = bench.with({});
   EXPECT_EQ(m.utime, 5000);
@@ -106,7 +106,7 @@ TEST(ContactSensor, ShowsThePointFromItsOwnSide) {
   EXPECT_EQ(m.points[0].normal[0], 1.0);
 }
 
-TEST(ContactSensor, OtherLinksOfTheSameBodyAreNotIts) {
+TEST(ContactSensor, IgnoresOtherLinksOfItsBody) {
   Bench bench("");
   EXPECT_FALSE(bench.with({touch(kHull, kBox), touch(kBox, kWall)}).pressed);
   EXPECT_EQ(bench.with({touch(kHull, kBox), touch(kBumper, kBox), touch(kWall, kBumper)}).n, 2);

@@ -225,7 +225,7 @@ TEST_F(CollisionsOf, ASecondBodyIsNewsTheFirstOneIsNot) {
   EXPECT_EQ(told[2].points[1].body, "crate/l");
 }
 
-TEST_F(CollisionsOf, AnotherRobotsAreNotItsOwn) {
+TEST_F(CollisionsOf, IgnoresContactsOfOtherRobots) {
   step({"wall/l"});
   now_.collisions[0].robot = RobotIndex(1);
   ++now_.step;

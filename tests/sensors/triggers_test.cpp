@@ -89,7 +89,7 @@ TEST(Touch, PublishesOnceAfterTheTargetsTime) {
   EXPECT_EQ(later[0].n, 0);
 }
 
-TEST(Touch, BeginsAnewAfterABreak) {
+TEST(Touch, RestartsAfterABreak) {
   TouchBench bench(boxes(kGreenFor10ms), "white", "touch_green");
   for (int i = 0; i < 3; ++i) {
     bench.now.contacts = {touch(kGreen, kFoot)};
@@ -183,7 +183,7 @@ TEST(PerformerDetector, PublishesPerformersThatEnterAndLeave) {
   EXPECT_THAT(names(went[0]), IsEmpty());
 }
 
-TEST(PerformerDetector, IsCalledAsItsTopic) {
+TEST(PerformerDetector, TakesTheNameOfItsTopic) {
   Bench<logical_camera_t> bench(region(kBox + "<topic>/arena/gate_1</topic>"), "gate", "gate_1");
   EXPECT_THAT(names(bench.step(true).at(0)), IsEmpty());
 }

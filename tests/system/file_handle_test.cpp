@@ -42,7 +42,7 @@ TEST(WriteAll, WritesOnWhereASignalInterruptsIt) {
   ::sigaction(SIGUSR1, &before, nullptr);
 }
 
-TEST(WriteAll, SaysWhereADiskIsFull) {
+TEST(WriteAll, ReportsAFullDisk) {
   const FileHandle full(::open("/dev/full", O_WRONLY | O_CLOEXEC));
   ASSERT_TRUE(full);
   EXPECT_EQ(write_all(full.get(), "abc", 3), 0u);

@@ -56,7 +56,7 @@ TEST_F(OutputFileTest, GetsItsNameWhenComplete) {
   EXPECT_EQ(names(), std::vector<std::string>{"file"});
 }
 
-TEST_F(OutputFileTest, IsWrittenByAProgramInOurPlace) {
+TEST_F(OutputFileTest, IsWrittenByAnotherProgram) {
   OutputFile file(path());
   const pid_t child = ::fork();
   if (child == 0) {
@@ -104,7 +104,7 @@ TEST_F(OutputFileTest, KeepsThePermissionsAndTheLinkOfTheOldFile) {
   EXPECT_EQ(fs::status(path()).permissions(), fs::perms::owner_read | fs::perms::owner_write);
 }
 
-TEST_F(OutputFileTest, IsWhereALinkPointsThatHasNoFileYet) {
+TEST_F(OutputFileTest, CreatesTheTargetOfADanglingLink) {
   fs::create_symlink("file", folder_ / "link");
   write_file((folder_ / "link").string(), "new");
   EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
@@ -114,7 +114,7 @@ TEST_F(OutputFileTest, IsWhereALinkPointsThatHasNoFileYet) {
 }
 
 // Killed in a container, where the next process has its number.
-TEST_F(OutputFileTest, HasNothingToDoWithAPartThatWasLeft) {
+TEST_F(OutputFileTest, IgnoresAnOldPartFile) {
   const std::string left = path() + ".part" + std::to_string(::getpid());
   std::ofstream(left) << "left";
   write_file(path(), "new");

@@ -31,7 +31,7 @@ class SealTest : public testing::Test {
   const std::vector<uint8_t> bytes_{1, 2, 3};
 };
 
-TEST_F(SealTest, IsKnownAgainByItsUserAlone) {
+TEST_F(SealTest, OnlyItsUserVerifiesIt) {
   const auto seal = seal_of(bytes_);
   ASSERT_TRUE(seal);
   EXPECT_TRUE(is_sealed(bytes_, *seal));
@@ -92,7 +92,7 @@ TEST_F(SealTest, TheKeyIsPrivateToItsUser) {
   EXPECT_FALSE(seal_of(bytes_));
 }
 
-TEST_F(SealTest, WithoutAPlaceForAKeyNothingIsSealed) {
+TEST_F(SealTest, WithoutAKeyFolderNothingIsSealed) {
   ::setenv("XDG_STATE_HOME", "/dev/null", 1);
   EXPECT_FALSE(seal_of(bytes_));
   EXPECT_FALSE(is_sealed(bytes_, Seal{}));

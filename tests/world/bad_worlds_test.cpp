@@ -356,7 +356,7 @@ TEST(BadFiles, IncludesThatMultiplyAreRefused) {
 
 // From a file as from a text: two folders up is refused, by whatever path, unless the user allows
 // absolute paths.
-TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
+TEST(BadFiles, AreNotReadOutsideTheSearchPath) {
   TemporaryFolder folder;
   const std::string model =
       "<sdf version='1.9'><model name='secret'><link name='l'/></model></sdf>";

@@ -34,7 +34,7 @@ TEST(Environment, IsReadAsWritten) {
   EXPECT_EQ(*e.magnetic_field, Vec3(1e-5, 2e-5, -3e-5));
 }
 
-TEST(Environment, OfAWorldThatSaysNothing) {
+TEST(Environment, HasDefaults) {
   const auto world = world_of("");
   EXPECT_FALSE(world->environment.placed);
   EXPECT_FALSE(world->environment.magnetic_field);

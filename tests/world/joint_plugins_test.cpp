@@ -167,7 +167,7 @@ TEST(PluginParameters, WarnsAboutParametersWithoutEffect) {
   }
 }
 
-TEST(PluginParameters, OnesThatSayTheSameAreNot) {
+TEST(PluginParameters, NoWarningForParametersWithTheUsualValue) {
   const std::string gz = "gz::sim::systems::";
   const Named cases[] = {
       {"f", gz + "PosePublisher", "<update_frequency>50</update_frequency>", ""},
@@ -353,7 +353,7 @@ TEST(RosGains, JointsWithATransmissionStayWhereTheyBegin) {
   EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::stay);
 }
 
-TEST(RosGains, JointsThatNothingDrivesAreFree) {
+TEST(RosGains, JointsWithoutAControllerAreFree) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("bot.urdf", bot(transmission("one", "Position"))));
   EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::free);

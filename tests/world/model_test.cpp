@@ -366,7 +366,7 @@ TEST(Drive, DefaultsComeFromTheWheels) {
   EXPECT_NEAR(d.max_force, 12 * 9.80665, 1e-9);
 }
 
-TEST(Drive, SidesThatAreSwappedAreSwappedBack) {
+TEST(Drive, RepairsSwappedSides) {
   const auto world = world_of(cart(
       "<plugin filename='libgazebo_ros_diff_drive.so' "
       "name='d'><leftJoint>right_joint</leftJoint><rightJoint>left_joint</rightJoint></plugin>"));

@@ -99,7 +99,7 @@ TEST(OddElements, AnActorsOwnShapesMove) {
   EXPECT_THAT(texts(*world), IsEmpty());
 }
 
-TEST(OddElements, TheRestOfTheWorldStands) {
+TEST(OddElements, AFaultyModelLeavesTheRestOfTheWorld) {
   const auto world =
       world_of(with_shape("<mesh><uri>x.dae</uri><scale>1 0 0</scale></mesh>") +
                "<model name='odd'><pose>one two</pose><link name='l'/></model>" + kBox);

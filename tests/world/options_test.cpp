@@ -237,7 +237,7 @@ TEST_F(Options, Disable) {
             std::string::npos);
 }
 
-TEST_F(Options, RobotsThatAreLeftTheSameStillShareTheirModel) {
+TEST_F(Options, UnchangedRobotsShareTheirModel) {
   LoadOptions options;
   for (const char* name : {"a", "b", "c"}) options.spawns.push_back({"bot.sdf", name, 0, 0, 0});
   for (size_t i = 0; i < 3; ++i) options.spawns[i].y = -2.0 * static_cast<double>(i);

@@ -37,7 +37,7 @@ TEST_F(Rooms, OfSomethingHugeIsFoundAtOnce) {
 }
 
 // A storey above the ground: which of both is meant, a height near it says.
-TEST_F(Rooms, StandOnTheStoreyThatIsMeant) {
+TEST_F(Rooms, StandOnTheRequestedStorey) {
   const auto fixed = [](const std::string& name, double top) {
     return "<model name='" + name + "'><static>true</static><pose>0 0 " +
            std::to_string(top - 0.1) +

@@ -333,7 +333,7 @@ TEST(RosControl, SeveralFilesAreReadAsOne) {
 }
 
 // A controller of other joints is another robot's.
-TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
+TEST(RosControl, IgnoresControllersOfMissingJoints) {
   TemporaryFolder folder;
   folder.write("package.xml", package("bot"));
   folder.write("config/c.yaml",
@@ -725,7 +725,7 @@ TEST(Guess, MecanumByName) {
   EXPECT_EQ(drive_of(*world).steering, Steering::mecanum);
 }
 
-TEST(Guess, TheFlagSaysItOtherwise) {
+TEST(Guess, TheOptionOverridesTheGuess) {
   TemporaryFolder folder;
   LoadOptions options;
   options.drives.push_back({"bot", {"wheel_front_left"}, {"wheel_front_right"}});

@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
       return std::string(info.param).substr(0, std::string(info.param).find('.'));
     });
 
-TEST(WorldTextTest, AMovedModelHasAnotherPoseAndNothingElseChanges) {
+TEST(WorldTextTest, AMovedModelChangesItsPoseOnly) {
   Text world(box("a", "      <pose>1 2 0.5 0 0 0</pose>  <!-- here -->\n") + box("b", ""));
   named(world.models, "a").X_WM = Pose::from_xyz_rpy({3, -1.25, 0.5}, {0, 0, 0.5});
   std::string expected = world.text();
@@ -135,7 +135,7 @@ TEST(WorldTextTest, ARemovedModelTakesItsLinesAlong) {
   EXPECT_EQ(world.saved(), expected);
 }
 
-TEST(WorldTextTest, ANewModelStandsAtTheEndUnderItsName) {
+TEST(WorldTextTest, AppendsANewModelUnderItsName) {
   Text world(box("a", ""));
   world.models.push_back({"c & d", Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}),
                           "<sdf version='1.9'>" + box("x", "") + "</sdf>", true});

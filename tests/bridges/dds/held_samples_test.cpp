@@ -56,7 +56,7 @@ std::vector<std::pair<ros2::Gid, int64_t>> found_in(Bytes bytes) {
   return found;
 }
 
-TEST(HeldSamples, OfAMessageAreThoseOfItsDataFragmentsAndGaps) {
+TEST(HeldSamples, CountDataFragmentsAndGaps) {
   for (const bool little : {true, false}) {
     EXPECT_THAT(
         found_in(message({header(), data(kWriter, 5, Bytes(8), 4, little),
@@ -71,7 +71,7 @@ TEST(HeldSamples, OfAMessageAreThoseOfItsDataFragmentsAndGaps) {
   EXPECT_THAT(found_in(message({header(), acknowledgement})), IsEmpty());
 }
 
-TEST(HeldSamples, OfParticipantsThatShareAMessageAreTheirOwn) {
+TEST(HeldSamples, CountEachParticipantOfASharedMessage) {
   Bytes body{0, 0, 0, 0, 2, 1, 1, 16};
   body.resize(20, 8);
   EXPECT_THAT(found_in(message({header(), data(kWriter, 5, Bytes(8)), submessage(0x0c, 0, body),
@@ -80,7 +80,7 @@ TEST(HeldSamples, OfParticipantsThatShareAMessageAreTheirOwn) {
   EXPECT_THAT(found_in(Bytes(19)), IsEmpty());
 }
 
-TEST(HeldSamples, WithImpossibleNumbersOrOfTooManyWritersBecomeNothing) {
+TEST(HeldSamples, IgnoreImpossibleNumbersAndTooManyWriters) {
   Bytes bytes =
       message({header(), data(kWriter, 0, Bytes(8)), data(kWriter, ~uint64_t{0}, Bytes(8)),
                data(kWriter, uint64_t{1} << 62 | 1, Bytes(8))});
@@ -111,7 +111,7 @@ TEST(HeldSamples, AHeartbeatWithoutThemDropsThem) {
   EXPECT_EQ(write_dropped({gid(7, kWriter), 1}, std::span(out).first(51)), 0u);
 }
 
-TEST(HeldSamples, GiveWayInTheirOrder) {
+TEST(HeldSamples, AreDroppedInTheirOrder) {
   HeldSamples held;
   constexpr size_t kTenth = kMostHeld / 10;
   for (int64_t i = 1; i <= 9; ++i) {

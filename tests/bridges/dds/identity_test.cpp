@@ -54,7 +54,7 @@ TEST(Identity, GoesFromThePayloadToTheInlineQos) {
   EXPECT_THAT(with_inline_identities(message), ElementsAreArray(wanted));
 }
 
-TEST(Identity, IsAddedToInlineQosThatIsThere) {
+TEST(Identity, IsAddedToExistingInlineQos) {
   const Bytes status{0x71, 0, 4, 0, 0, 0, 0, 0};
   const Bytes marked = with_identity(kPayload, request());
   const Bytes message = joined({kHeader, data(7, joined({status, kSentinel, marked}))});
@@ -63,7 +63,7 @@ TEST(Identity, IsAddedToInlineQosThatIsThere) {
   EXPECT_THAT(with_inline_identities(message), ElementsAreArray(wanted));
 }
 
-TEST(Identity, OfOtherMessagesChangesNothing) {
+TEST(Identity, LeavesOtherMessagesUnchanged) {
   for (const Bytes& message :
        {joined({kHeader, kTime, data(5, kPayload), kHeartbeat}), joined({kHeader, kTime}), Bytes{},
         Bytes{'R', 'T'}, joined({kHeader, {0x15, 5, 200, 0, 1}}),

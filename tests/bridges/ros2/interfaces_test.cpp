@@ -124,7 +124,7 @@ TEST(Interfaces, RejectsAnUnknownRelease) {
   EXPECT_THROW(parse_distro("noetic"), InputError);
 }
 
-TEST(Names, AreMadeFitForRos) {
+TEST(Names, AreConvertedToRosNames) {
   EXPECT_EQ(ros_name("p3at"), "p3at");
   EXPECT_EQ(ros_name("3dx"), "r3dx");
   EXPECT_EQ(ros_name("front-left..laser"), "front_left_laser");
@@ -160,7 +160,7 @@ TEST(Names, TfHasARobotsFramesWithItsNameOrInItsNamespace) {
   EXPECT_THROW(parse_tf_layout("none"), InputError);
 }
 
-TEST(Names, OfTwoRobotsAreNeverOne) {
+TEST(Names, OfTwoRobotsAlwaysDiffer) {
   Names names("", {});
   names.update({"a-b", "a_b", "a.b"});
   EXPECT_EQ(names.topic("a_b", "scan"), "/a_b/scan");  // ROS allows its own name
@@ -180,7 +180,7 @@ TEST(Names, ARemapOfAnActionMovesItsParts) {
   EXPECT_EQ(names.topic("", "simulate_steps_2"), "/simulate_steps_2");
 }
 
-TEST(Names, NewNamesAreOfRosAndOfNothingElse) {
+TEST(Names, NewNamesAreValidRosNames) {
   for (const char* name : {"scan2", "/1x//y", "/a b", "/", "", "/a/", "/a__b", "/odom", "/a/2"}) {
     Names names("p3at", {{"/scan", name}});
     names.topic("p3at", "scan");
@@ -193,7 +193,7 @@ TEST(Names, NewNamesAreOfRosAndOfNothingElse) {
   EXPECT_NO_THROW(swapped.check_remaps());
 }
 
-TEST(Names, ARemapOfNothingIsRefused) {
+TEST(Names, RefusesARemapWithoutEffect) {
   Names names("p3at", {{"/scam", "/x"}});
   names.topic("p3at", "scan");
   EXPECT_THROW(names.check_remaps(), InputError);

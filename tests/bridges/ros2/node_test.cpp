@@ -207,7 +207,7 @@ TEST(Node, ReadsOneTypeOfCmdVelAndTheOtherOnceItIsPublished) {
   }
 }
 
-TEST(Node, CommandsTheJointsOfTheRobotThatIsThere) {
+TEST(Node, CommandsTheJointsOfTheCurrentRobot) {
   const auto shared = std::make_shared<Middleware>();
   std::vector<std::string> joints{"a", "b"};
   NodeOptions options;
@@ -239,7 +239,7 @@ TEST(Node, CommandsTheJointsOfTheRobotThatIsThere) {
   EXPECT_EQ(commanded, joints);
 }
 
-TEST(Node, KeepsNothingOfRobotsThatAreGone) {
+TEST(Node, ForgetsRemovedRobots) {
   const auto shared = std::make_shared<Middleware>();
   NodeOptions options;
   Node node(options, std::make_unique<FakeTransport>(shared), {arm("first")},

@@ -116,7 +116,7 @@ TEST_F(Lifetimes, CloseWakesWaitingThreads) {
   EXPECT_EQ(sleeping.get(), "this simulation was closed");
 }
 
-TEST_F(Lifetimes, ACallbackIsNotCalledOnceItsSubscriptionWent) {
+TEST_F(Lifetimes, AClosedSubscriptionCallsNoCallback) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
   auto count = std::make_unique<std::atomic<int>>(0);
@@ -296,7 +296,7 @@ TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
   EXPECT_EQ(server->leaves, 5);
 }
 
-TEST_F(Lifetimes, AServerThatHasEndedIsNotWaitedFor) {
+TEST_F(Lifetimes, DoesNotWaitForAnEndedServer) {
   Simulation sim = simulation(server);
   sim.pause();
   server->gone = true;
@@ -608,7 +608,7 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   sim.pause();  // it joins anew
 }
 
-TEST_F(Lifetimes, AnotherServersSignsEndNothing) {
+TEST_F(Lifetimes, MessagesOfAnotherServerEndNothing) {
   const Simulation sim = simulation(server);
   int events = 0;
   const Subscription event = sim.on_new_run([&] { ++events; });

@@ -168,7 +168,7 @@ TEST_F(Receiving, NextAfterAMotionReturnsANewerSample) {
   EXPECT_EQ(odometry.next(kPatience).x, 4.0);
 }
 
-TEST_F(Receiving, APrimitiveGoesOutAgainUntilAStatusShowsIt) {
+TEST_F(Receiving, RepeatsAPrimitiveUntilAStatusShowsIt) {
   const Simulation sim = simulation(server);
   const Robot robot = sim.robot("p3at");
   const Motion first = robot.advance(1.0), second = robot.advance(2.0);

@@ -32,7 +32,7 @@ std::pair<int, std::string> taken(int nparts, size_t size) {
   return {info.part, ""};
 }
 
-TEST(WorldInfo, PartsThatAreKeptHaveBounds) {
+TEST(WorldInfo, LimitsUnfinishedParts) {
   EXPECT_EQ(taken(1024, 60'000), std::make_pair(1023, std::string()));
   const auto [many, too_many] = taken(32767, 100);
   EXPECT_EQ(many, 0);

@@ -472,7 +472,7 @@ TEST_F(JudgeTest, JudgesTheRobotOfTheExpectation) {
   EXPECT_THROW(judge(expected, box("box", "0 0 0.5 0 0 0")), InputError);
 }
 
-TEST_F(JudgeTest, MetricsSayHowWellItWent) {
+TEST_F(JudgeTest, ReportsMetricsOfTheRun) {
   Expectations expected = goal(9.0, 0.0, 0.25, 1.0);
   expected.goals.push_back({1.0, 0.0, 0.25, 1.0});
   judge(expected);
