@@ -1,4 +1,4 @@
-// What the user does with the run: requests, driving, motion primitives, placing models.
+// The user's control of the run: requests, driving, motion primitives, placing models.
 import {
   joint_command_t,
   move_command_t,

@@ -23,8 +23,8 @@ export class Model {
   readonly wanted = new Wanted(this.page, this.link);
   private readonly forgetters: ((reset: boolean) => void)[] = [];
 
-  // Registers a call for when what was drawn so far is of another moment. reset: because the world
-  // was reset.
+  // Registers a call for when the drawn state is of another moment. reset: because the world was
+  // reset.
   onForget(call: (reset: boolean) => void): void {
     this.forgetters.push(call);
   }
@@ -46,7 +46,7 @@ export class Model {
     else this.link.step(ahead);
   }
 
-  // What is played goes on or stands still: the shown past, else the log or the run itself.
+  // Resumes or pauses the shown past, else the log or the run itself.
   playOrPause(): void {
     const { past } = this.page.now;
     if (past) this.link.play(!past.playing, past.speed);

@@ -33,7 +33,7 @@ export class Retrace {
     model.page.watch(["hello"], () => this.kept.clear());
   }
 
-  // One after the other; of those asked for meanwhile, only the last.
+  // One after the other; of the requests made meanwhile, only the last.
   private begin(): void {
     this.again = true;
     if (this.busy) return;
@@ -70,7 +70,7 @@ export class Retrace {
       this.history(of("odometry_t"), kOdometry),
     ]);
     const { now, world: shown } = { ...shownOf(this.model.page.now)!, ...this.model.page.now };
-    if (shown !== world || this.again) return; // another moment is asked for by now
+    if (shown !== world || this.again) return; // another moment has been requested since
     const until = (history: History) => {
       const count = history.times.filter((time_s) => time_s <= now + 1e-9).length;
       return history.columns.map((column) => column.slice(0, count));

@@ -1,4 +1,4 @@
-// Passes messages to the views that show them. ruedo/info tells the type of each channel.
+// Passes messages to the views that show them. ruedo/info has the type of each channel.
 import type { device_info_t, Messages } from "../../generated/messages";
 import { isCompared } from "../state/comparison";
 import type { Loading } from "../state/loading";
@@ -47,7 +47,7 @@ export function routesOf(world: World): Map<string, Route> {
   return routes;
 }
 
-// What shows the pictures of single channels.
+// The views for pictures of single channels.
 type Cameras = readonly {
   message(channel: string, image: Messages["image_t"], source: Source): void;
 }[];

@@ -1,4 +1,4 @@
-// What each key does.
+// The keyboard shortcuts.
 import type { Stage } from "../scene/stage";
 import { chooseNextRobot, toggleGoing, togglePanel, toggleTheme } from "../state/choices";
 import type { EditPage } from "../ui/edit_page";

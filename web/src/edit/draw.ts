@@ -61,7 +61,7 @@ export class Draw {
       void this.finish();
     } else this.beginAt(this.stage.picker, { clientX: x, clientY: y });
   }
-  // What would be drawn to that point of the page.
+  // The drawing if the pointer ends at this point of the page.
   look(x: number, y: number): void {
     if (this.from) this.drag({ clientX: x, clientY: y });
   }

@@ -176,7 +176,7 @@ export class Editor {
     return this.rewrite(name, `${what} ${name}`, by);
   }
 
-  // What stands on the ground stays on the ground.
+  // Models on the ground stay on the ground.
   async scale(name: string, factor: Size): Promise<boolean> {
     const pose = await this.knownPose(name),
       model = this.find(name),
@@ -241,7 +241,7 @@ export class Editor {
     return true;
   }
 
-  // What the server says, or why it did not.
+  // The server's reply, or the reason why there is none.
   private async write(how: "" | "overwrite" | "copy"): Promise<string | Error> {
     const { changes } = this.page.now.edits,
       body = how ? encode("name_request_t", { name: how }) : undefined;
@@ -350,7 +350,7 @@ export class Editor {
     });
   }
 
-  // What SPAWNs that model again; null if there is none.
+  // The request that SPAWNs that model again; null if there is none.
   async textOf(name: string): Promise<string | null> {
     const index = this.gone.has(name)
       ? -1

@@ -105,8 +105,8 @@ function numbersIn(text: string): number {
   return parts.every((part) => part !== "" && Number.isFinite(Number(part))) ? parts.length : 0;
 }
 
-// What is a list of numbers remains one of as many. path: the places among the children, from the
-// model on. Throws, with the reason.
+// A list of numbers keeps its length. path: the indices among the children, from the model on.
+// Throws, with the reason.
 export function withText(xml: string, path: readonly number[], text: string): string {
   const place = path.reduce((at, i) => at.children[i]!, topModel(xml));
   const before = textIn(xml, place);

@@ -300,7 +300,7 @@ export interface Door {
   height: number;
 }
 
-// Makes a door in the wall that contains a point of the model: what remains is a piece to the left,
+// Makes a door in the wall that contains a point of the model, and leaves a piece to the left,
 // one to the right and one above. Throws, with the reason, if there is no wall.
 export function withDoor(xml: string, [px, py]: [x: number, y: number], door: Door): string {
   const top = topModel(xml),

@@ -1,4 +1,4 @@
-// What can be placed in a world.
+// The things that can be placed in a world.
 import { boxModel, cylinderModel, sphereModel } from "./sdf";
 import type { Thing } from "../state/page";
 

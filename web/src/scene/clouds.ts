@@ -30,7 +30,7 @@ export function pointsOfLidar(scan: lidar_t): Float32Array {
   return points.subarray(0, at);
 }
 
-// How bright each return is, 0 to 1; null if the scanner does not tell.
+// The brightness of each return, 0 to 1; null if the scanner does not measure it.
 export function intensitiesOf({
   ranges,
   intensities,

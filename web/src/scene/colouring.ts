@@ -7,7 +7,7 @@ const kHighest_m = 3, // above the floor: the coldest colour
   kColdest = 0.66; // hue
 
 // Of points x, y, z in the device's frame, which is so high above that of the robot. Warm is near,
-// low, or bright; cold is far, high, or dim. intensities: null if the device does not tell.
+// low, or bright; cold is far, high, or dim. intensities: null if not measured.
 export function coloursOf(
   points: Float32Array,
   intensities: Float32Array | null,

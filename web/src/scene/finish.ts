@@ -49,7 +49,7 @@ function plainPicture(fine: THREE.Texture): THREE.Texture {
   plain.anisotropy = 1;
   plain.colorSpace = THREE.NoColorSpace; // see plainMaterial
   plain.minFilter = THREE.LinearMipmapNearestFilter;
-  plain.version = 0; // a clone wants to be uploaded at once, with a warning a frame until it can be
+  plain.version = 0; // a clone would be uploaded at once, with a warning a frame until it can be
   fine.userData.plain = plain;
   arrived(fine);
   return plain;

@@ -1,4 +1,4 @@
-// How long a frame takes to be drawn, measured by a fence that nobody waits for.
+// Measures the drawing time of a frame by a fence, without waiting for it.
 export class FrameTimer {
   private fence: WebGLSync | null = null;
   private begun_ms = 0;

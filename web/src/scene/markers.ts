@@ -1,5 +1,5 @@
-// What clients draw: lines, paths, points, texts and maps, in layers, in the world or moving with a
-// robot.
+// The drawings of clients: lines, paths, points, texts and maps, in layers, in the world or moving
+// with a robot.
 import * as THREE from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";

@@ -140,7 +140,7 @@ class ScanView {
     this.group.matrixAutoUpdate = false;
   }
 
-  // What it saw last, in its own frame.
+  // Its latest sample, in its own frame.
   get seen(): { points: Float32Array; colours: Float32Array } {
     const all = this.points.object.geometry.getAttribute("position") as THREE.BufferAttribute,
       points = (all.array as Float32Array).subarray(0, 3 * this.hits);
@@ -418,7 +418,7 @@ export class RobotOverlay {
     this.stay(device.name, time_s, cloud);
     this.changed = true;
   }
-  // What a device saw stays where it was in the world.
+  // A device's sample stays at its place in the world.
   private stay(
     device: string,
     time_s: number,

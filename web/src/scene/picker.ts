@@ -1,4 +1,4 @@
-// What is under a point of the canvas.
+// Finds the things under a point of the canvas.
 import * as THREE from "three";
 import type { Bodies } from "./bodies";
 
@@ -17,7 +17,7 @@ export class Picker {
     );
   }
 
-  // The visible point under a point of the canvas. Where nothing is drawn, the floor goes on; null
+  // The visible point under a point of the canvas. Beyond all models it is on the floor; null
   // above the horizon.
   point(x: number, y: number): THREE.Vector3 | null {
     return this.seen(this.caster(x, y))?.point ?? this.floor(x, y);
@@ -27,7 +27,7 @@ export class Picker {
     return this.level(x, y, this.bodies.description?.floor ?? 0);
   }
 
-  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none,
+  // The thing under a point of the canvas: a robot (-1 for none), the name of a model ("" for none,
   // and for the ground), and the point as of point().
   pick(x: number, y: number): { robot: number; model: string; point: THREE.Vector3 | null } {
     const caster = this.caster(x, y),

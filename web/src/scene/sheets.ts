@@ -8,7 +8,7 @@ import { matrixOf } from "./matrix";
 const kThin_m = 0.05, // height of a sheet, at most
   kNear_m = 0.02, // between the tops of two that lie on each other, at most
   kTouch_m = 0.001, // those that overlap by less lie beside each other
-  kMostTriangles = 500, // of a part: larger ones are no sheets
+  kMostTriangles = 500, // of a part: larger ones do not count as sheets
   kMostSheets = 4000,
   kHighest = 4; // level
 

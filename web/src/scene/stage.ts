@@ -20,14 +20,14 @@ export class Stage {
   readonly view: Viewpoint;
   readonly bodies: Bodies;
   readonly picker: Picker;
-  frames = 0; // drawn so far
+  frames = 0; // drawn since the start
   frameCost_ms = 0; // of this thread, smoothed
   firstDrawn_ms = 0; // when the world was first drawn, since navigation
   private readonly lights = new Lights();
   private readonly further = new Set<FurtherView>();
   private readonly fog = new THREE.Fog(0); // begins behind what is looked at
   private timer: FrameTimer | null = null;
-  private shadows = true; // what the user wants
+  private shadows = true; // the user's choice
   private wireframe = false;
   private dirty = true;
   private sensed = false; // sensor data has changed and is not drawn yet

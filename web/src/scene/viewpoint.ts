@@ -18,7 +18,7 @@ export interface Shown {
   high: number[];
 }
 
-// What home shows of a world with those bounds. ceiling: nothing above it is drawn.
+// The view that home gives of a world with these bounds. ceiling: nothing above it is drawn.
 export function shownOf(
   world: { low: number[]; high: number[]; floor: number; ceiling: number | null } | null,
 ): Shown {
@@ -127,7 +127,7 @@ export class Viewpoint {
     this.begin(homeOf(shown, this.camera.fov, this.camera.aspect));
   }
 
-  // As a file wants to be looked at.
+  // The view that a file defines.
   begin({ eye, target }: { eye: THREE.Vector3; target: THREE.Vector3 }): void {
     this.controls.target.copy(target);
     this.look(eye.clone().sub(target));

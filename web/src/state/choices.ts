@@ -1,4 +1,4 @@
-// What the user chooses to see, by a button or a key.
+// The user's choice of layers, by a button or a key.
 import { remember } from "./memory";
 import type { Page } from "./page";
 

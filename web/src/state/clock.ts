@@ -8,7 +8,7 @@ export class Clock {
   private last: { wall_s: number; sim_s: number } | null = null;
   private moved = false; // to another moment, whose state has not come yet
 
-  // forget: called when what was drawn so far is of another moment. reset: because the world was
+  // forget: called when the drawn state is of another moment. reset: because the world was
   // reset.
   constructor(
     private readonly page: Page,
@@ -33,7 +33,7 @@ export class Clock {
     this.last = { wall_s, sim_s: time_s };
   }
 
-  // Another moment is asked for: the next state counts, however little it goes back.
+  // Another moment was requested: the next state counts, however little it goes back.
   move(): void {
     this.moved = true;
   }

@@ -19,7 +19,7 @@ export const kLimits = {
 } as const;
 
 const kOfPoints: readonly (keyof Display)[] = ["size", "opacity", "decay_s", "colouring"];
-// What can be set of which layer.
+// The settings of each layer.
 export const kSettings: Partial<Record<Layer, readonly (keyof Display)[]>> = {
   rays: ["strength"],
   points: kOfPoints,
@@ -45,7 +45,7 @@ const usual = (layer: Layer): Display => ({
   colouring: layer === "clouds" ? "range" : "plain",
 });
 
-// What is wrong is as usual.
+// Invalid values become the defaults.
 export function displaysOf(text: string | null): Displays {
   try {
     const found = JSON.parse(text ?? "[]") as [string, Display][];

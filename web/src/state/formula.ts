@@ -147,7 +147,7 @@ function derivative(of: Evaluate): Evaluate {
   };
 }
 
-// Throws, with the reason, if it is none.
+// Throws, with the reason, if the text is not a formula.
 export function formulaOf(channel: string, text: string): Formula {
   const parser = new Parser(channel, text),
     at = parser.whole();

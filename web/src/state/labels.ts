@@ -1,4 +1,4 @@
-// What pixels of pictures of labels mean: bodies, or models of a class.
+// The meaning of pixels in label pictures: bodies, or models of a class.
 import type { device_info_t } from "../../generated/messages";
 import type { PageState } from "./page";
 

@@ -1,4 +1,4 @@
-// What can be drawn over the scene, and in which colour.
+// The layers that can be drawn over the scene, and their colours.
 export const kLayers = [
   "rays",
   "points",
@@ -32,7 +32,7 @@ export const kLayerColours: Record<Layer, string> = {
   markers: "#f2f2f2",
 };
 
-// What robots sense, and where they are.
+// The robots' samples and positions.
 export const kOfRobots: readonly Layer[] = [
   "rays",
   "points",

@@ -1,4 +1,4 @@
-// What this browser remembers of the page.
+// The state of the page that this browser stores.
 export const remember = (key: string, value: string) => {
   try {
     localStorage.setItem(`ruedo.${key}`, value);

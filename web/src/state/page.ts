@@ -13,7 +13,7 @@ export type Tab = (typeof kTabs)[number];
 
 export type ViewMode = "orbit" | "follow" | "top";
 
-// What can be placed: one of the server's models, or SDF. name: of the model that is made.
+// A thing to place: one of the server's models, or SDF. name: of the model that is made.
 export interface Thing {
   name: string;
   model: string;
@@ -21,12 +21,12 @@ export interface Thing {
   label?: string;
 }
 
-// What a click on the scene does: select, send the chosen robot there, place a thing, or draw.
+// The action of a click on the scene: select, send the chosen robot there, place a thing, or draw.
 export type Tool = "select" | "go" | "wall" | "room" | "door" | "measure" | Thing;
-// What the handles of the selected model do.
+// The action of the selected model's handles.
 export type Handle = "translate" | "rotate" | "scale";
 
-// What can be undone and redone: the names of the next steps, and the net number of changes.
+// Undo and redo: the names of the next steps, and the net number of changes.
 export interface HistoryState {
   undo: string | null;
   redo: string | null;

@@ -1,7 +1,7 @@
 // A place to return to (time, camera, robot, selected model, and what is open), as the fragment of
 // a URL.
 
-// What is open: the panel's page, the layers that are off, and the panes of plots.
+// The open parts of the page: the panel's page, the layers that are off, and the panes of plots.
 export interface Open {
   page: string;
   off: string[];

@@ -1,4 +1,4 @@
-// What the page knows, in one place: values are set here, and views watch those that they show.
+// The state of the page, in one place: values are set here, and views watch those that they show.
 export class Store<State extends object> {
   private readonly watchers: { keys: (keyof State)[]; call: () => void }[] = [];
 

@@ -1,4 +1,4 @@
-// What runs, assembled from the parts of ruedo/info.
+// The run's world, assembled from the parts of ruedo/info.
 import type {
   body_info_t,
   channel_info_t,

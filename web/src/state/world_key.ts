@@ -1,8 +1,8 @@
-// What the browser's memory and the names of downloads call the shown world.
+// The name of the shown world in the browser's memory and in names of downloads.
 import type { PageState } from "./page";
 import { shownOf } from "./time";
 
-// Of its file, for many worlds are called "default"; its name if there is no file.
+// The file's name, since many worlds are called "default"; the world's if there is no file.
 export function worldKey({ hello, world }: Pick<PageState, "hello" | "world">): string {
   return hello?.world || (world?.name ?? "");
 }

@@ -80,7 +80,7 @@ export class Dock {
     });
   }
 
-  // What is open, and where; null on a phone.
+  // The open panes and their places; null on a phone.
   get kept(): SerializedDockview | null {
     return this.shape === "wide" ? this.api.toJSON() : this.wide;
   }
@@ -199,7 +199,7 @@ export class Dock {
     this.look();
   }
 
-  // What is seen now.
+  // The visible panes.
   private look(): void {
     const groups = this.api.groups.filter(({ api }) => api.isVisible),
       active = this.api.activePanel?.id,

@@ -1,4 +1,4 @@
-// All elements of the selected model's text as a tree. What has no elements inside is a field.
+// All elements of the selected model's text as a tree. An element without children is a field.
 import { attributeOf, textIn, withText } from "../edit/properties";
 import { topModel, type Place } from "../edit/sdf";
 import { h } from "../widgets/elements";
@@ -22,7 +22,7 @@ export class ElementTree {
     });
   }
 
-  // null: there is none to be changed.
+  // null: there is no text to change.
   show(xml: string | null): void {
     this.element.hidden = xml === null;
     if (xml === this.xml) return; // it may be edited just now

@@ -20,7 +20,7 @@ const kColours: Record<string, string> = {
   lost: "#8a8f98",
   difference: "#b58cff",
 };
-// half the slider's thumb: the ends of its range are so far from those of the line
+// half the slider's thumb: the distance of its range's ends from those of the line
 const kThumb_px = 8;
 const kNear_px = 6;
 const kHeight_px = 14;

@@ -21,7 +21,7 @@ export class FieldPlots {
   readonly element: HTMLElement;
   private readonly panes: Pane[] = [];
   private zoom: Zoom | null = null;
-  private isFirst = true; // no world was shown so far
+  private isFirst = true; // no world has been shown yet
   private of = ""; // the world that the panes belong to
   private readonly newest = new Map<string, object>(); // messages of plotted and of offered channels
   private offered = ""; // channel, and how many fields of it
@@ -176,7 +176,7 @@ export class FieldPlots {
     for (const pane of this.panes) pane.restyle();
   }
 
-  // What is open.
+  // The open plots.
   get kept(): Kept[] {
     return this.panes.map(({ xy, series }) => ({
       xy,

@@ -18,7 +18,7 @@ export interface Panels {
 
 export class Layout {
   private of = ""; // the world that the layout belongs to
-  private isFirst = true; // no world was shown so far
+  private isFirst = true; // no world has been shown yet
 
   constructor(
     private readonly page: Page,

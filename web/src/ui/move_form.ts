@@ -3,7 +3,7 @@ import { move_command_t } from "../../generated/messages";
 import { h, say } from "../widgets/elements";
 import type { Move } from "../state/go_to";
 
-const kFarthest = { min: -1000, max: 1000 }, // m; what is asked for is hardly further
+const kFarthest = { min: -1000, max: 1000 }, // m; targets are hardly further away
   kMostTurned = { min: -36_000, max: 36_000 }; // degrees
 
 function numberInput(label: string, more: Record<string, string | number>): HTMLInputElement {

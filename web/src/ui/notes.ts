@@ -1,5 +1,5 @@
-// What the program has warned of, and what the page has said: each note with its times, the newest
-// first, as toasts disappear.
+// The warnings of the program and the notes of the page, each with its times, the newest first,
+// since toasts disappear.
 import { clockText } from "../state/clock";
 import type { Page, PageState } from "../state/page";
 import { h, onToast, toast } from "../widgets/elements";
@@ -10,8 +10,8 @@ export class Notes {
   readonly element: HTMLElement;
   private readonly list = h("ol", { class: "notes", id: "notes" });
   private readonly warnings = h("ol", { class: "notes", id: "warnings" });
-  private isFaulty = false; // of the shown world, and it was said
-  private readonly none = h("p", { class: "dim" }, "Nothing was said so far.");
+  private isFaulty = false; // of the shown world, and a note was made
+  private readonly none = h("p", { class: "dim" }, "No notes yet.");
 
   constructor(page: Page) {
     const clear = h("button", { id: "clear-notes", click: () => this.clear() }, "Clear");

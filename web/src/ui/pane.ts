@@ -12,7 +12,7 @@ import type { Series } from "../state/series";
 
 const kColours = ["--true", "--odometry", "--sonar", "--rays", "--accent", "--text"];
 const kDouble_ms = 300; // between the clicks of a double click, at most
-const kCurves_ms = 200; // between two drawings of curves, which are made anew each time
+const kCurves_ms = 200; // between two drawings of curves, which are created again each time
 
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();

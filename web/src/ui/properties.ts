@@ -35,7 +35,7 @@ export class PropertyList {
   private shown: Properties | null = null;
   private asked = 0;
   private pending = 0; // edits that the server has not answered yet
-  // What is being typed: an answer to an earlier edit would take it back.
+  // The fields being typed into: a reply to an earlier edit would revert them.
   private readonly typed = new Set<HTMLInputElement>();
 
   constructor(
@@ -132,8 +132,8 @@ export class PropertyList {
     await this.settle(this.editor.rename(this.page.now.selected, this.name.value.trim()));
   }
 
-  // Until the server has answered, the fields keep what was entered: a text that was asked for
-  // earlier would take it back.
+  // Until the server has answered, the fields keep the entered values: the reply to an earlier
+  // request would revert them.
   private async settle(edit: Promise<boolean>): Promise<void> {
     ++this.pending;
     const good = await edit;

@@ -17,7 +17,7 @@ export class Publisher {
   private readonly words = h("p", { class: "dim", role: "status", id: "published" });
   private shown = "";
 
-  // publish: false if there is no connection.
+  // publish: returns false without a connection.
   constructor(
     private readonly page: Page,
     private readonly publish: (channel: string, message: Uint8Array) => boolean,

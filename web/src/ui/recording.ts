@@ -16,7 +16,7 @@ export class Recording {
     recorder.start(1000);
   }
 
-  // Once there is a picture in it: on a slow machine none may have been drawn so far. redraw: draws
+  // Ends it once there is a picture: on a slow machine none may have been drawn yet. redraw: draws
   // the view, whether it has changed or not.
   async stop(redraw: () => void): Promise<void> {
     if (this.ending) return;

@@ -128,7 +128,7 @@ export class RobotPages {
     this.showNone(true);
   }
 
-  // Says whether there is no robot to show.
+  // Shows a note if there is no robot to show.
   showNone(none: boolean): void {
     this.none.hidden = !none;
     this.about.hidden = this.plotPage.hidden = none;

@@ -130,7 +130,7 @@ export class Transform {
   }
 
   // Only the number that was edited counts: the others keep all their digits, and where the model
-  // is now. What is no number, or is refused, is taken back.
+  // is now. Text that is not a number, or that the server refuses, is reverted.
   private async put(i: number): Promise<void> {
     const { selected } = this.page.now,
       pose = this.editor.pose(selected),

@@ -1,5 +1,5 @@
-// Camera pictures, JPEG and raw, on a canvas: the browser's cache of images would keep those that
-// nobody sees any more.
+// Camera pictures, JPEG and raw, on a canvas: the browser's cache of images would keep old
+// pictures.
 import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
@@ -14,7 +14,7 @@ const kMostPixels = 1 << 24;
 const kMostLabels = 16; // in the legend
 const kCount_K = 0.01; // of a thermal camera, unless its file says otherwise
 
-// What the pixels of a raw picture are.
+// The kinds of pixels of a raw picture.
 export type Quantity = "colour" | "depth" | "labels" | "temperature";
 export function quantityOf({ pixelformat }: image_t, deviceKind = ""): Quantity {
   if (pixelformat === image_t.PIXEL_FORMAT_FLOAT_GRAY32) return "depth";

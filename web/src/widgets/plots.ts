@@ -7,7 +7,7 @@ import { h } from "./elements";
 
 export const kWindow_s = 30;
 const kLeast = 0.02; // m/s, rad/s or m: what is smaller is noise
-const kLate_s = 0.5; // a longer step back begins anew
+const kLate_s = 0.5; // a longer step back restarts the plot
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -34,8 +34,8 @@ export class TimePlot {
     new ResizeObserver(() => this.build()).observe(this.element);
   }
 
-  // Adds one value at that time; the other series keep their last one. What comes a little late
-  // counts only if something else is of its time.
+  // Adds one value at that time; the other series keep their last one. A slightly late value
+  // counts only if another series has one of its time.
   add(series: number, time_s: number, value: number): void {
     const times = this.times,
       drawn = drawable(value);

@@ -24,8 +24,8 @@ export function tickStep(span: number, most: number): number {
   return [1, 2, 5, 10].map((n) => n * power).find((step) => step >= least * (1 - 1e-9))!;
 }
 
-// What is drawn in a field of that many pixels: all points with some room around them; with equal
-// scales, if so wished.
+// The ranges shown in a field of this size in pixels: all points with a margin; with equal
+// scales, if requested.
 export function boxAround(
   points: Iterable<readonly [number, number]>,
   [width, height]: [number, number],

@@ -98,7 +98,7 @@ export interface FileStore {
   url(path: string): string; // the URL of a file
 }
 
-// Null if there is no world to show. base: the folder of its files. store: the files in the page;
+// Null without a world to show. base: the folder of its files. store: the files in the page;
 // null: they come from the server.
 export async function loadScene(
   store: FileStore | null,

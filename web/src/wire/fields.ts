@@ -52,8 +52,8 @@ export function arraysOf(type: string): string[] {
     .map(({ name }) => name);
 }
 
-// What an element of an array is called in its message: that of a joint, by the joints' names; ""
-// for nothing.
+// The name of an array's element in its message: that of a joint, by the joints' names; "" if it
+// has none.
 export function nameOf(message: unknown, path: string): string {
   const [, field, index] = /^(\w+)\[(\d+)\]$/.exec(path) ?? [],
     [stem] = field?.split("_") ?? [];
@@ -66,7 +66,7 @@ export function nameOf(message: unknown, path: string): string {
 export const kOverAll = ["min", "max", "mean", "sum"] as const;
 type Over = (typeof kOverAll)[number];
 
-// Of the finite numbers; NaN if there are none.
+// Of the finite numbers; NaN without one.
 function overAll(over: Over, values: number[]): number {
   const finite = values.filter(Number.isFinite),
     total = finite.reduce((sum, value) => sum + value, 0);

@@ -1,6 +1,6 @@
 // Whether a connected server still answers. A connection outlives a server that was stopped and a
 // network that broke; without this the page would show old data as if it were current.
-const kQuiet_ms = 3000; // without a message; then the server is asked
+const kQuiet_ms = 3000; // without a message; then the page pings the server
 
 export class Heartbeat {
   private heard_ms = 0;

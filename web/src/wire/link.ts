@@ -33,7 +33,7 @@ export function historyOf(
 // The last row of each message: the past is looked through again with each jump in it.
 const rows = new WeakMap<Uint8Array, { of: string; row: number[] }>();
 
-// Null for what is no whole message of a known type.
+// Null unless the bytes are one whole message of a known type.
 function rowOf(bytes: Uint8Array, paths: string[]): number[] | null {
   const of = paths.join(),
     kept = rows.get(bytes),

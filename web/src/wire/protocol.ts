@@ -1,4 +1,4 @@
-// What the server and a page tell each other, through a socket or from a log in the page itself.
+// The messages between the server and a page, through a socket or from a log in the page itself.
 
 // world: tells world files apart; save: the file that SAVE writes; compared: the other log; "" if
 // there is none.
@@ -58,7 +58,7 @@ export interface LinkHandler {
   playback(playback: Playback): void;
   // Events from that index on. From 0 on: earlier ones are no longer valid.
   events(first: number, events: RunEvent[]): void;
-  // What the program has warned of, from that index on.
+  // The program's warnings, from that index on.
   warnings(first: number, warnings: Warning[]): void;
   // The result of the comparison with the other log.
   comparison(comparison: Comparison): void;
@@ -72,7 +72,7 @@ export interface Warning {
   text: string;
 }
 
-// What a page can ask of a run, be it through a socket or of a log in the page itself.
+// The requests of a page to a run, through a socket or to a log in the page itself.
 export interface RunLink {
   connect(handler: LinkHandler): void;
   want(channels: Iterable<string>): void;
@@ -82,7 +82,7 @@ export interface RunLink {
   seek(time_s: number): void;
   // To the next state of the bodies, or the previous one.
   step(ahead: boolean): void;
-  // The values of fields of a channel so far.
+  // The values of fields of a channel up to now.
   history(channel: string, paths: string[]): Promise<History>;
 }
 

@@ -1,5 +1,5 @@
 // The last minutes of a live run as this page has seen them: a link that records what passes, so
-// that an earlier moment can be shown while the run goes on. Commands always act on the live run.
+// that an earlier moment can be shown while the run continues. Commands always act on the live run.
 
 import { kTypes } from "../../generated/messages";
 import { historyOf } from "./link";
@@ -240,7 +240,7 @@ export class Rewind implements RunLink {
     entries.push({ time, messages, size });
   }
 
-  // What was drawn before the oldest kept moment is still visible then: its newest version is kept.
+  // Drawings from before the oldest kept moment are still visible: the newest version is kept.
   private forgetDrawn(): void {
     const entries = this.drawn ? this.entries.get(this.drawn.channel)! : [];
     while (entries.length > 1 && entries[1]!.time <= this.range.begin)
