@@ -418,7 +418,7 @@ std::string Core::what_is_known(double rate) const {
   return text;
 }
 
-// What the receiving thread does each time before it waits; returns for how long it may.
+// The receiving thread calls this before it waits; returns the longest time to wait.
 std::chrono::milliseconds Core::before_turn() {
   if (const auto now = Clock::now(); server_ && now >= listen_at_) {
     listen_at_ = now + kListenTime;
@@ -485,7 +485,7 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   if (progress_.is_told()) note_progress(in.int32(), utime);
 }
 
-// What was sent up to that time has come.
+// All messages up to that time have arrived.
 void Core::note_progress(int32_t epoch, int64_t utime) {
   if (callbacks_.is_idle()) return progress_.received(epoch, utime);
   callbacks_.put(

@@ -75,10 +75,10 @@ class Core : public std::enable_shared_from_this<Core> {
   // Whether a message is of this client's run, or, where it may take over, of the one that has
   // taken its place. The receiving thread's.
   bool is_of_our_run(int64_t run_id, bool may_take_over = false);
-  // What comes may be of the next run, of which there is no info yet. The receiving thread's.
+  // Messages may be of the next run, whose info is still missing. For the receiving thread.
   bool in_doubt() const { return watch_.in_doubt(); }
   RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
-  // Asked for once, and again where the world has changed.
+  // Requested once, and again when the world has changed.
   JointLimits joint_limits(const std::string& robot);
   int64_t utime() const { return clock_.utime(); }
   int64_t next_id() { return ++ids_; }

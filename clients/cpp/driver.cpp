@@ -12,9 +12,9 @@
 namespace ruedo::client {
 namespace {
 
-// A primitive goes out again until a status shows it: messages may be lost, and the server takes
-// each once. One that no status has shown after so many statuses and this time reaches nobody, or
-// was replaced at once.
+// A primitive is sent again until a status shows it: messages may be lost, and the server executes
+// each once. One that no status has shown after so many statuses and this time is lost, or was
+// replaced at once.
 constexpr std::chrono::milliseconds kFirstAgain(100), kLastAgain(1000);
 constexpr int kUnseenStatuses = 20;
 constexpr auto kUnseenTime = std::chrono::seconds(5);

@@ -37,9 +37,9 @@ struct MotionCore {
   double progress = 0.0, remaining = 0.0;
   int unseen = 0;  // statuses that did not show it
   int64_t utime =
-      -1;  // of the newest status; before it is another run's, or of a reset that info will tell of
+      -1;  // of the newest status; earlier ones are of another run, or of a coming reset
   int64_t shown = -1;                              // of the newest status that shows it
-  std::chrono::steady_clock::time_point again_at;  // it is sent then, where no status has shown it
+  std::chrono::steady_clock::time_point again_at;  // when to send it unless a status shows it
   std::chrono::steady_clock::duration again{};
   std::vector<std::thread::id> waiting;
 
@@ -64,9 +64,9 @@ class Driver : public std::enable_shared_from_this<Driver> {
 
   // Publishes the command now, and again until the next one.
   void keep_sending(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
-  // What is held, and the newest primitive where no status has shown it: by real time.
+  // Repeats the held command, and the newest primitive until a status shows it, by real time.
   void repeat(Bus& bus);
-  void repeat_at(int64_t utime, Bus& bus);  // what is held, by sim time
+  void repeat_at(int64_t utime, Bus& bus);  // the held command, by sim time
   double period() const;                    // s of real time between repetitions
 
   std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel,

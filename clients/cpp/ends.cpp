@@ -1,4 +1,4 @@
-// What is called at the program's end, and the count of ends under way.
+// The functions called at the program's end, and the count of ends under way.
 #include "ends.h"
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// What the end of the program does and waits for: exit(), and the return of main().
+// The work of the program's end, which exit() and the return of main() wait for.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ class AtProgramEnd {
   const std::function<void()> call_;
 };
 
-// The end of a simulation that goes on in a thread of its own: while one of these lives, the
+// The end of a simulation that continues in a thread of its own: while one of these lives, the
 // program's end waits, for a moment.
 class EndUnderWay {
  public:

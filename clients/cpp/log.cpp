@@ -106,7 +106,7 @@ std::vector<uint8_t> LogReader::data() {
   return bytes;
 }
 
-// s to us: infinity stands for before and after everything.
+// s to us: infinities mean before and after everything.
 int64_t microseconds(double time) {
   constexpr double kLatest = kLatestLogTime_us * 1e-6;
   return std::llround(std::min(std::max(time, -kLatest), kLatest) * 1e6);

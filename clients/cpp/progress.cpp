@@ -1,4 +1,4 @@
-// What the server is told: the line of src/run/backpressure.h.
+// Reports progress to the server, by the line of src/run/backpressure.h.
 #include "progress.h"
 
 #include <algorithm>

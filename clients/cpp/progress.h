@@ -1,8 +1,8 @@
 // How far a program has come in a run that it launched: the server waits for it there.
 //
 // A run at the highest rate takes a second of sim time in less than a millisecond. A program that
-// looks at a sensor and then commands would act on a world that has gone on without it. So it tells
-// its server what it has received, and from which moment on it works with what it knew then.
+// looks at a sensor and then commands would act on a world that has changed since. So it reports to
+// its server up to which sim time it has received, and the sim time of the samples in use.
 #pragma once
 
 #include <atomic>
@@ -28,13 +28,13 @@ class Progress {
   // next one says all that it did.
   void begin(std::function<void(const std::string& line)> tell, int32_t epoch, int64_t utime);
   bool is_told() const { return told_; }
-  // It is to be told again soon: a thread works with what it was given.
+  // Progress must be reported again soon: a thread is using a sample.
   bool in_use() const;
   // All that the server sent up to that sim time has come, and callbacks have seen it.
   void received(int32_t epoch, int64_t utime);
-  // These threads work with what is known at that sim time.
+  // These threads use samples of that sim time.
   void use(int64_t utime, const Threads& threads = {std::this_thread::get_id()});
-  // The caller's thread waits for what the server sends.
+  // The caller's thread waits for messages of the server.
   void wait();
   // Callbacks get what the server sends.
   void listen();
@@ -55,14 +55,14 @@ class Progress {
   int32_t epoch_ = 0;
   int64_t received_ = 0;  // us of sim time
   std::map<std::thread::id, Use> uses_;
-  std::string last_;  // that was said
+  std::string last_;  // reported line
 };
 
-// The pipe by which `ruedo regress` is told how far the client that it launched is
+// The pipe that reports the progress of a launched client to `ruedo regress`
 // (docs/protocol.md).
 class ToRegression {
  public:
-  // The regression that launched this program, if that is its address; null: there is none.
+  // The regression at that address that launched this program; null if there is none.
   static std::unique_ptr<ToRegression> at(const std::string& url);
 
   explicit ToRegression(int descriptor);

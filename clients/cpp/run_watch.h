@@ -15,7 +15,7 @@ namespace ruedo::client {
 // but for another().
 class RunWatch {
  public:
-  // `say` is called once for each run of the client's, with the id of a run that goes on beside it.
+  // `say` is called once for each run of the client, with the id of a run beside it.
   explicit RunWatch(std::function<void(int64_t)> say) : say_(std::move(say)) {}
 
   // The client has a new run.

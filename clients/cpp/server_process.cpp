@@ -32,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kMostHeard = size_t{1} << 16;  // bytes of warnings that are read at once
-constexpr size_t kMostWarned = 1000;            // warnings, each of which is said once
+constexpr size_t kMostWarned = 1000;            // warnings, each of which is printed once
 
 bool is_program(const fs::path& path) {
   std::error_code error;

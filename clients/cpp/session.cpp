@@ -118,7 +118,7 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
       throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " +
                     text_of(timeout) + " s");
     }
-    lock.unlock();  // it may take long, and the receiving thread goes on meanwhile
+    lock.unlock();  // it may take long, and the receiving thread continues meanwhile
     publish(kind, session, sequence, body);
     lock.lock();
     news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
@@ -165,7 +165,7 @@ void Session::on_reply(const uint8_t* bytes, size_t size) {
   } catch (const WireError&) {
     return;
   }
-  if (reply.code == reply_t::ENDED && reply.session == 0)  // nobody asked
+  if (reply.code == reply_t::ENDED && reply.session == 0)  // without a request
     return core_.note_end(reply.text);
   if (reply.kind != request_t::JOIN && reply.session != session_) return;
   std::unique_lock lock(mutex_);

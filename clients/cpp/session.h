@@ -57,9 +57,9 @@ class Session {
                int32_t epoch = -1);
 
   // Gives the session back, once; at the program's end, too. Others would wait for a client in
-  // lockstep whose LEAVE was lost: it is repeated until it is answered, for a moment, since the
-  // server may be gone: in that case no longer than that is unknown. It takes no turn: who has that
-  // may be a callback in step() that ends the program.
+  // lockstep whose LEAVE was lost: it is repeated until its reply, for a moment, since the server
+  // may be gone: in that case no longer than that is unknown. It waits for no other request: a
+  // callback in step() that ends the program may be in one.
   void leave();
   void on_reply(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 

@@ -1,4 +1,4 @@
-// Sim time, and those who wait for it.
+// Sim time, and the threads that wait for it.
 #include "sim_clock.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Sim time, as the messages of the server tell it, and how long the server has been silent.
+// Sim time by the server's messages, and the time for which the server has been silent.
 #pragma once
 
 #include <atomic>
@@ -27,12 +27,12 @@ class SimClock {
   void note_tick(int64_t utime);
   void note_sign();  // something came that has no time
   void reset(int64_t utime);
-  // No message of this run is so far yet: it was false.
+  // Whether the time is too far ahead of this run's messages to be right.
   bool is_far_ahead(int64_t utime) const;
   double silence() const;  // s of real time since the last sign of life
   // duration: us. check: called meanwhile, every 0.5 s at least; what it throws ends the waiting.
   void sleep(int64_t duration, const std::function<void()>& check);
-  void wake();  // those who sleep check at once
+  void wake();  // sleeping threads check at once
 
  private:
   using SteadyClock = std::chrono::steady_clock;

@@ -1,4 +1,4 @@
-// Whether sim time goes on while a call waits for it, and why it may not.
+// Whether sim time advances while a call waits for it, and if not, why.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@ class Standstill {
   Standstill(const SimClock& clock, std::string call, std::function<std::string()> why);
 
   void look();           // says so, once, when it has stood still for 5 s
-  std::string reason();  // why the call has waited in vain; "": sim time goes on
+  std::string reason();  // why the call has waited in vain; "": sim time advances
 
  private:
   Clock::duration stands_for();

@@ -14,8 +14,8 @@
 namespace ruedo::client {
 namespace {
 
-constexpr double kMostUneven = 0.25;  // periods: gaps of samples that are taken at whole steps tell
-                                      // no more than that
+constexpr double kMostUneven = 0.25;  // periods: with longer steps, gaps of samples show no
+                                      // losses
 constexpr size_t kHead = 16;  // bytes of a message: fingerprint, and in all of the server's types
                               // the time
 

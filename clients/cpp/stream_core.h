@@ -1,7 +1,7 @@
 // A subscription to one channel: the newest sample, its readers, and what went wrong.
 //
-// The receiving thread keeps the newest message as it came. It is decoded by who asks for it, and
-// in the thread of the callbacks.
+// The receiving thread keeps the newest message undecoded. Readers decode it, and so does the
+// thread of the callbacks.
 #pragma once
 
 #include <atomic>
@@ -25,10 +25,10 @@ namespace ruedo::client {
 
 struct ChannelInfo;
 
-// Thread safe. The connection has one for each channel that was asked for; handles may outlive it.
+// Thread safe. The connection has one for each requested channel; handles may outlive it.
 class StreamCore : public std::enable_shared_from_this<StreamCore> {
  public:
-  // decoder: null where there is none for the channel's type. step_us: the simulation's. faults: of
+  // decoder: null if the channel's type has no decoder. step_us: the simulation's. faults: of
   // callbacks.
   StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel, const SampleDecoder* decoder,
              int64_t step_us, const std::shared_ptr<CallbackFaults>& faults);
@@ -48,16 +48,16 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   struct Neighbours {
     std::shared_ptr<const Sample> before, after;  // the same where one is of the moment
   };
-  // Around a moment (us), once the stream has come so far. Nothing: it is before what is kept.
-  // Throws as read() does.
+  // The samples around a time (us), once the stream has reached it. Nothing if it is older than
+  // the kept samples. Throws as read() does.
   std::optional<Neighbours> around(int64_t utime, Duration timeout);
   int64_t kept_from();  // us; 0: nothing is kept
   void listen() { subscribe(*connection()); }
   int64_t missed() const { return *missed_; }  // by the callbacks
   Subscription on_sample(std::function<void(const Sample&)> callback);
-  // The same in the receiving thread, for what is this library's own.
+  // The same in the receiving thread, for this library's own use.
   Subscription on_arrival(std::function<void(const Sample&)> callback);
-  void forget();  // what came is of a run that has ended
+  void forget();  // the samples are of a run that has ended
   void end();     // its robot is gone
 
  private:
@@ -82,7 +82,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   const std::weak_ptr<Core> core_;
   const std::string channel_, robot_, type_;
   const int64_t fingerprint_;      // as ruedo/info said first
-  const double rate_, period_us_;  // 0: what is missing cannot be told
+  const double rate_, period_us_;  // 0: lost samples cannot be counted
   const SampleDecoder* decoder_;
   const std::shared_ptr<Callbacks> callbacks_;
   const std::shared_ptr<Callbacks> arrivals_ = std::make_shared<Callbacks>();
@@ -95,7 +95,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   std::shared_ptr<Arrival> newest_;
   std::deque<std::shared_ptr<Arrival>> kept_;  // for around() and read(), the newest last
   size_t kept_bytes_ = 0;
-  size_t least_kept_ = 1;  // the largest depth so far
+  size_t least_kept_ = 1;  // the largest depth until now
   int64_t count_ = 0;      // samples that came or were lost
   std::optional<int64_t> last_utime_;
   std::vector<std::thread::id> waiting_;  // for a sample

@@ -29,7 +29,7 @@ std::terminate_handler terminate_otherwise = nullptr;
     const bool failed = print_unthrown_faults();
     std::fflush(nullptr);
     std::_Exit(failed ? EXIT_FAILURE : EXIT_SUCCESS);
-  } catch (...) {  // NOLINT(bugprone-empty-catch): the other handler tells of it
+  } catch (...) {  // NOLINT(bugprone-empty-catch): the other handler reports it
   }
   terminate_otherwise();
   std::abort();

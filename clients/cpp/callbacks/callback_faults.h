@@ -1,4 +1,4 @@
-// What callbacks threw, until a call of their connection throws it.
+// Keeps exceptions of callbacks until a call of their connection rethrows them.
 #pragma once
 
 #include <exception>
@@ -8,15 +8,15 @@
 
 namespace ruedo::client {
 
-// Of one connection; in shared_ptrs alone. Thread safe. What no call has thrown gives the program
-// an exit code that is not 0.
+// Of one connection; in shared_ptrs only. Thread safe. An exception that no call has rethrown
+// gives the program an exit code other than 0.
 class CallbackFaults : public std::enable_shared_from_this<CallbackFaults> {
  public:
-  // what: the callback was on. Whether it is kept: false while another one is.
+  // what: the callback's channel or event. Returns whether it is kept: false if another one is.
   bool keep(std::exception_ptr fault, const std::string& what);
-  void rethrow();  // the one that is kept, once
-  // Where it cannot be thrown: in a destructor, or while another exception is on its way. The
-  // program still fails, unless a call has thrown one of these before.
+  void rethrow();  // the kept one, once
+  // Where it cannot be thrown: in a destructor, or while another exception is thrown. The program
+  // still fails, unless a call has thrown one of these before.
   void print();
 
  private:
@@ -31,10 +31,10 @@ class CallbackFaults : public std::enable_shared_from_this<CallbackFaults> {
   bool has_thrown_ = false;
 };
 
-// Prints what no call has thrown. False: there was nothing.
+// Prints exceptions that no call has rethrown. False if there are none.
 bool print_unthrown_faults();
 
-// What an exception says, for the terminal.
+// The message of an exception, for the terminal.
 std::string text_of(const std::exception_ptr& fault);
 
 }  // namespace ruedo::client

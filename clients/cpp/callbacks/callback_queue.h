@@ -1,4 +1,4 @@
-// What runs the user's callbacks: a thread of its own, so that receiving never waits for them.
+// The thread that runs the user's callbacks, so that receiving never waits for them.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ class CallbackQueue {
   ~CallbackQueue();  // stops
 
   void start();     // makes the thread; a second time nothing
-  void keep_all();  // whoever sends waits for the callbacks: nothing is dropped any more
+  void keep_all();  // the sender waits for the callbacks: from now on no call is dropped
   // on: what the call is on, for the log.
   void put(Call call, const std::string& on);
   // A sample of so many bytes. Where more than a megabyte of them waits, the newest of each stream
@@ -44,7 +44,7 @@ class CallbackQueue {
    private:
     const std::shared_ptr<State> state_;
   };
-  void run_waiting();  // for who has borrowed: returns when all calls so far have returned
+  void run_waiting();  // for the borrower: returns when all earlier calls have returned
 
  private:
   const std::shared_ptr<State> state_;  // the thread has one, too: a call may destroy the queue

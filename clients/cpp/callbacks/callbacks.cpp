@@ -57,7 +57,7 @@ void CallbackCore::await_call() {
   waits.all.erase(me);
 }
 
-// Whether whoever calls it is this thread, or waits for one that this thread calls.
+// Whether this thread runs it, or runs another callback that its thread waits for.
 bool CallbackCore::waits_for_this_thread() const {
   const auto& all = of_this_process<Waits>().all;
   const CallbackCore* one = this;

@@ -25,7 +25,7 @@ namespace ruedo::client {
 inline constexpr std::chrono::seconds kLongTime(5);
 void say_awaited(const std::string& what);
 
-// What a Subscription holds.
+// The state behind a Subscription.
 class CallbackCore {
  public:
   // faults: keeps what it throws; null: that is printed once.
@@ -80,7 +80,7 @@ class Callback : public CallbackCore {
   Callback(std::string what, std::shared_ptr<CallbackFaults> faults, Function function)
       : CallbackCore(std::move(what), std::move(faults)), function_(std::move(function)) {}
 
-  // What the callback throws harms no other callback.
+  // An exception of the callback harms no other callback.
   void call(Arguments... arguments) {
     const Call call(*this);
     if (closed_) return;

@@ -1,4 +1,4 @@
-// What step() saw, decoded on demand.
+// The observations of step(), decoded on demand.
 #include "core.h"
 #include "samples/sample_types.h"
 

@@ -19,7 +19,7 @@ namespace {
 constexpr auto kFirstRepeat = std::chrono::milliseconds(5),
                kLastRepeat = std::chrono::milliseconds(100);
 constexpr int kDoubtedAfter = 20;             // silences in a row: 1.7 s and more
-constexpr size_t kMostWanted = 256;           // messages asked for at once
+constexpr size_t kMostWanted = 256;           // messages requested at once
 constexpr int64_t kFurthest = INT64_MAX / 2;  // steps
 
 }  // namespace
@@ -128,7 +128,7 @@ void Stepper::take_part(Duration timeout) {
   part_ = true;
 }
 
-// The state that stands, for who joins later and grants nothing.
+// Reads the current state, for a client that joins later and grants nothing.
 void Stepper::look(Duration timeout) {
   const State state = state_of(
       core_.session().request_in_turn(request_t::GET_STATE, encoded(name_request_t{}), timeout));
@@ -245,14 +245,14 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
   }
 }
 
-// Those that are not here; they are asked for.
+// Forgets incomplete steps, which are requested again.
 void Stepper::forget_steps() {
   steps_.erase(steps_.upper_bound(have_), steps_.end());
   listed_ = 0;
 }
 
-// Of what stands between this client and the next step some may not be the server's: all of it is
-// asked for anew.
+// Some of the messages since the last complete step may not be the server's: all are requested
+// again.
 void Stepper::doubt() {
   forget_steps();
   newest_ = have_;

@@ -17,7 +17,7 @@ namespace ruedo::client {
 namespace {
 
 constexpr size_t kMostEarly = 512;             // messages of one channel that wait for their ticks
-constexpr size_t kMostEarlyBytes = 256 << 20;  // of all: no server goes on with so much unheard
+constexpr size_t kMostEarlyBytes = 256 << 20;  // of all: no server continues with so much unheard
 constexpr int32_t kMostChannels = 1 << 16;     // more cannot be subscribed
 constexpr int kMostParts = 1024;
 constexpr size_t kMostListed = 1 << 20;  // messages: 160 steps of a fleet
@@ -72,7 +72,7 @@ void Stepper::on_message(int32_t channel, const uint8_t* bytes, size_t size) {
   early.push_back({size, crc, utime, std::move(copy)});
   early_bytes_ += size;
   if (early_bytes_ <= kMostEarlyBytes) return;
-  for (std::deque<Early>& all : early_) all.clear();  // what is missed is asked for
+  for (std::deque<Early>& all : early_) all.clear();  // missing messages are requested
   early_bytes_ = 0;
 }
 
@@ -100,7 +100,7 @@ void Stepper::on_tick(const uint8_t* bytes, size_t size) {
   try {
     if (part_) take_tick(bytes, size);
   } catch (const WireError&) {
-    return;  // broken: it is asked for
+    return;  // broken: it is requested again
   }
 }
 
@@ -205,7 +205,7 @@ void Stepper::on_reply(const Reply& reply) {
     if (reply.sequence != grant_.sequence || grant_.taken) return;
     grant_.taken = ask_now_ = true;  // it was repeated: its ticks may be lost
   } catch (const WireError&) {
-    return;  // damaged: it is asked for again
+    return;  // damaged: it is requested again
   }
 }
 

@@ -1,4 +1,4 @@
-// What little samples can compute, and samples of any type. Their decoders are made from
+// The few computations of samples, and samples of any type. Their decoders are made from
 // proto/vocabulary.toml.
 #include <algorithm>
 #include <cmath>

@@ -42,8 +42,8 @@ class WireReader {
     return {reinterpret_cast<const char*>(bytes), length - 1};
   }
 
-  // What is printed: a terminal obeys control characters, so a name has none, and in a longer text
-  // '?' stands for each but line ends and tabs.
+  // Text to print: a terminal obeys control characters, so a name has none, and in a longer text
+  // '?' replaces each but line ends and tabs.
   std::string name() {
     std::string text = string();
     if (!is_one_line(text)) throw WireError("a name with control characters");

@@ -74,7 +74,7 @@ BodyInfo read_body(WireReader& in) {
   return body;
 }
 
-// What follows the fingerprint and utime. The head of every part is the same.
+// The rest after the fingerprint and utime. The head of every part is the same.
 void read_part(WireReader& in, WorldInfo& info) {
   info.run_id = in.int64();
   info.epoch = in.int32();
@@ -183,7 +183,7 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   return info;
 }
 
-// What is not whole yet waits in memory.
+// Incomplete parts wait in memory.
 void WorldInfoAssembler::check_size(int nparts) {
   size_t size = 0;
   for (const auto& [part, content] : parts_) size += content.size();

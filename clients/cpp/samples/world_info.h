@@ -42,7 +42,7 @@ struct WorldInfo {
 // A type's fingerprint as lcm-gen's sources write it, without the 0x.
 std::string hex(int64_t fingerprint);
 
-// Of a world_info_t; nothing where it is none that this client reads.
+// Decodes a world_info_t; nothing if this client cannot read it.
 std::optional<int64_t> run_id_of(const uint8_t* bytes, size_t size);
 
 // Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An

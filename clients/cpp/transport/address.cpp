@@ -36,7 +36,7 @@ std::string resolve_url(const std::string& url) {
   if (!url.empty()) return url;
   const char* named = std::getenv("LCM_DEFAULT_URL");
   if (named && *named) return named;
-  // What `ruedo run` serves by itself: TCP where multicast has no route.
+  // The default address of `ruedo run`: TCP where multicast has no route.
   return has_multicast_route() ? bus::kDefaultUrl : "tcpq://127.0.0.1:7700";
 }
 

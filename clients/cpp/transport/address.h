@@ -1,4 +1,4 @@
-// LCM URLs: which one is meant, and whether it can be reached.
+// LCM URLs: chooses one, and checks whether it can be reached.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace ruedo::client {
 
-// As the server reads it. Throws NoServer for a text that is no address of a client's.
+// Reads it as the server does. Throws NoServer if the text is not a client's address.
 bus::LcmUrl read_address(const std::string& url);
 
 // Or LCM_DEFAULT_URL, or LCM's default with ttl 0, or TCP where multicast has no route.

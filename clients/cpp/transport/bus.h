@@ -35,7 +35,7 @@ class Bus {
   // Throws Error for a message that is larger than what a server takes from a client.
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
   static void check_size(const std::string& channel, size_t size);  // throws likewise
-  bool is_connected() const;  // false: what is published now reaches nobody
+  bool is_connected() const;  // false: messages published now are lost
   void receive_eagerly();     // as Transport's
   void stop();  // nothing is received or published any more, but for the handler that runs
   // Stops, and waits for that handler; one that calls this does not wait for itself or another.

@@ -1,5 +1,5 @@
-// What was made before a fork is the parent's: in the child its threads do not run, its locks may
-// be held for ever, and its server is not the child's to end.
+// Objects made before a fork belong to the parent: in the child their threads do not run, their
+// locks may be held for ever, and the child must not end their server.
 #pragma once
 
 #include <pthread.h>
@@ -22,8 +22,8 @@ class Forked {
   const int made_at_ = fork_count();
 };
 
-// One for all of this process. A fork's child begins with a new one: in the parent's a lock may be
-// held, by a thread that is not there. It outlives every static object, which may still use it.
+// One for all of this process. A fork's child begins with a new one: a thread of the parent that
+// the child lacks may hold its lock. It outlives every static object, which may still use it.
 template <class State>
 State& of_this_process() {
   static State* state = new State;
@@ -31,7 +31,7 @@ State& of_this_process() {
   return static_cast<void>(registered), *state;
 }
 
-// An end for writing, which no child of a fork keeps open: who reads is to know when this process
+// An end for writing, which no child of a fork keeps open: the reader must notice when this process
 // closes it, or ends. It is a socket's, to which writing raises no SIGPIPE.
 class ParentsPipe {
  public:
@@ -41,7 +41,7 @@ class ParentsPipe {
   ParentsPipe& operator=(const ParentsPipe&) = delete;
 
   FileHandle open();  // the end for reading; none: errno says why
-  // Does not wait: it drops the text where the pipe is full or nobody reads it. Thread safe, as
+  // Does not wait: it drops the text if the pipe is full or has no reader. Thread safe, as
   // close().
   void write(std::string_view text);
   void close();

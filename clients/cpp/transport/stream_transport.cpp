@@ -82,7 +82,7 @@ bool StreamTransport::receive(bus::StreamConnection& from, const Receiver& recei
 
 bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
   const auto open = connection();
-  if (!open) {  // those who wait find out by their timeouts
+  if (!open) {  // waiting threads notice by their timeouts
     std::this_thread::sleep_for(std::min(timeout, kAgain));
     try {
       connect();

@@ -36,7 +36,7 @@ class StreamTransport : public Transport {
 
   const bus::LcmUrl address_;
   std::mutex mutex_;
-  std::shared_ptr<bus::StreamConnection> connection_;  // null: there is no server
+  std::shared_ptr<bus::StreamConnection> connection_;  // null without a server
   std::set<std::string> channels_;
   std::atomic<bool> busy_{false};  // receive() takes something
 };

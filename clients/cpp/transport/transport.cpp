@@ -1,4 +1,4 @@
-// Which transport an address wants.
+// Chooses the transport of an address.
 #include "transport/transport.h"
 
 #include "transport/address.h"

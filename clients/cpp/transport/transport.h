@@ -1,4 +1,4 @@
-// What carries messages: the interface.
+// The interface of transports, which carry messages.
 #pragma once
 
 #include <chrono>
@@ -26,7 +26,7 @@ class Transport {
   virtual bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) = 0;
   // Something waits for receive(), or its receiver has not seen all of what it took.
   virtual bool has_news() { return false; }
-  // False: nothing can be sent, since there is no server.
+  // False: nothing can be sent without a server.
   virtual bool is_connected() { return true; }
   // From now on without sleeping between messages that follow each other closely, as in lockstep.
   // Not while another thread receives.

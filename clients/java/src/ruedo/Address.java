@@ -200,7 +200,7 @@ final class Address {
             probe();
             return true;
         } catch (IOException error) {
-            // The queue of one that is stopped is full, which is none of Java's own exceptions.
+            // The queue of a stopped server is full, for which Java has no exception of its own.
             return path != null
                     && error instanceof SocketException
                     && !(error instanceof ConnectException)

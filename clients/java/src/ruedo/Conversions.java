@@ -9,7 +9,7 @@ final class Conversions {
         final long fingerprint;
         final Decoder decoder;
         final boolean any; // of messages of any type
-        final String key; // what tells it from others of a channel; "": Ruedo's own samples
+        final String key; // distinguishes it from others of a channel; "": Ruedo's own samples
 
         Conversion(long fingerprint, Decoder decoder) {
             this(fingerprint, decoder, false, "");

@@ -5,9 +5,9 @@ import java.util.List;
 
 /** A motion primitive under way. Thread safe. */
 public final class Motion {
-    // A primitive goes out again until a status shows it: messages may be lost, and the server
-    // takes each once. One that no status has shown after so many statuses and seconds reaches
-    // nobody, or was replaced at once.
+    // A primitive is sent again until a status shows it: messages may be lost, and the server
+    // executes each once. One that no status has shown after so many statuses and seconds is
+    // lost, or was replaced at once.
     private static final double FIRST_AGAIN = 0.1; // s of real time
     private static final double LAST_AGAIN = 1.0;
     private static final int UNSEEN_STATUSES = 20;
@@ -31,7 +31,7 @@ public final class Motion {
     private double again = FIRST_AGAIN;
     private Deadline untilAgain = new Deadline(0.0);
     private final List<Thread> waiting = new ArrayList<>();
-    // Of the newest status; an earlier one is another run's, or of a reset that info will tell of.
+    // Of the newest status; an earlier one is another run's, or of a reset that info will report.
     private long utime = -1;
     private long shown = -1; // of the newest status that shows it
 

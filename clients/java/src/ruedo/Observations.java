@@ -32,7 +32,7 @@ public final class Observations extends State {
     public final List<Message> messages;
 
     private final Object lock = new Object();
-    private Map<String, List<Message>> byChannel; // under lock; null: nobody asked yet
+    private Map<String, List<Message>> byChannel; // under lock; null: not requested yet
 
     Observations(State state, List<Message> messages) {
         super(

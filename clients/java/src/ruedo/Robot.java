@@ -31,7 +31,7 @@ public final class Robot {
         this.name = name;
     }
 
-    // What it is.
+    // Description.
 
     private robot_info_t info() {
         return sim.robotInfo(name);

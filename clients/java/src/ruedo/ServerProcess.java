@@ -34,7 +34,7 @@ final class ServerProcess {
 
     private static final int MOST_SAID = 1 << 16; // bytes of its last lines
     private static final int MOST_HEARD = 1 << 16; // bytes of warnings that are read at once
-    private static final int MOST_WARNED = 1000; // warnings, each of which is said once
+    private static final int MOST_WARNED = 1000; // warnings, each of which is printed once
 
     final String url;
     private final List<String> command;

@@ -167,7 +167,7 @@ final class Session {
         } catch (IOException error) {
             return;
         }
-        if (received.code == reply_t.ENDED && received.session == 0) { // nobody asked
+        if (received.code == reply_t.ENDED && received.session == 0) { // without a request
             sim.noteEnd(received.text);
             return;
         }
@@ -223,7 +223,7 @@ final class Session {
                                     + Deadline.text(timeout)
                                     + " s");
                 }
-                // Not under the lock: it may take long, and the receiving thread goes on meanwhile.
+                // Not under the lock: it may take long, and the receiving thread continues.
                 publish(kind, toSession, number, body);
                 reply_t answer;
                 synchronized (news) {

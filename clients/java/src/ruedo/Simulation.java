@@ -133,7 +133,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return (hash + info.head.utime + before * 0x9e3779b1L & 0x7fffffff) << 20; // far apart
     }
 
-    // What there is.
+    // Description.
 
     /** Of the server. */
     public String version() {

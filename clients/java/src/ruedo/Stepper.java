@@ -29,9 +29,9 @@ final class Stepper {
     private static final long FIRST_REPEAT_MILLIS = 5;
     private static final long LAST_REPEAT_MILLIS = 100;
     private static final long ACKNOWLEDGED_TOGETHER = 32; // steps
-    private static final int MOST_WANTED = 256; // messages asked for at once
+    private static final int MOST_WANTED = 256; // messages requested at once
     private static final int MOST_EARLY = 512; // messages of one channel that wait for their ticks
-    private static final long MOST_EARLY_BYTES = // no server goes on with so much unheard
+    private static final long MOST_EARLY_BYTES = // no server continues with so much unheard
             Math.min(256 << 20, Runtime.getRuntime().maxMemory() / 4);
     private static final int MOST_CHANNELS = 1 << 16; // more cannot be subscribed
     private static final int MOST_PARTS = 1024; // of a tick
@@ -476,7 +476,7 @@ final class Stepper {
         queue.addLast(new Early(java.nio.ByteBuffer.wrap(data).getLong(8), crc, data));
         earlyBytes += data.length;
         if (earlyBytes <= MOST_EARLY_BYTES) return;
-        for (ArrayDeque<Early> all : early) all.clear(); // what is missed is asked for
+        for (ArrayDeque<Early> all : early) all.clear(); // missing messages are requested
         earlyBytes = 0;
     }
 
@@ -492,7 +492,7 @@ final class Stepper {
         try {
             if (part) takeTick(message);
         } catch (IOException error) {
-            // broken: it is asked for
+            // broken: it is requested again
         }
     }
 
@@ -602,7 +602,7 @@ final class Stepper {
             try {
                 takePieces(new WireReader(reply.body));
             } catch (IOException error) {
-                return; // broken: it is asked for again
+                return; // broken: it is requested again
             }
         } else if (reply.sequence == grantSequence && !taken) {
             taken = true; // it was repeated: its ticks may be lost

@@ -72,10 +72,10 @@ final class StreamCore<T extends Sample> {
     final Simulation sim;
     final String channel;
     final String type;
-    final Conversions.Conversion conversion; // null: there is none for the type
+    final Conversions.Conversion conversion; // null if the type has none
     final Place place = new Place(); // of the streams, where they are readers themselves
     private final boolean hasTime;
-    private final double period; // us; 0: what is missing cannot be told
+    private final double period; // us; 0: lost samples cannot be counted
     private final List<Subscription> arrivals = new CopyOnWriteArrayList<>(); // the package's own
     private final List<Subscription> callbacks = new CopyOnWriteArrayList<>();
     private final AtomicLong missed = new AtomicLong(); // by the callbacks
@@ -224,7 +224,7 @@ final class StreamCore<T extends Sample> {
         arrival.number = count;
         keep(arrival);
         if (!waiting.isEmpty()) sim.progress.use(sim.clock.utime(), waiting);
-        waiting.clear(); // who waits on says so
+        waiting.clear(); // a thread that waits on registers again
         notifyAll();
     }
 

@@ -22,7 +22,7 @@ final class WorldInfo {
     final Map<String, robot_info_t> robots = new LinkedHashMap<>();
     final List<channel_info_t> channelList = new ArrayList<>(); // as ruedo/tick counts them
     final List<Body> bodies; // that are there now
-    final int tickChannel; // in that list; -1: there is none
+    final int tickChannel; // in that list; -1 if there is none
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
     private final Map<String, Map<String, channel_info_t>> deviceChannels = new HashMap<>();
