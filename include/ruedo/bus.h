@@ -16,7 +16,7 @@ class Bus {
   // Safe from any thread. Never throws: a message that cannot be sent is counted.
   virtual void publish(const std::string& channel, const uint8_t* data, size_t size) = 0;
 
-  // What was published is on its way when this returns, at the latest. For busy publishers
+  // Returns when all published messages are on their way, at the latest. For busy publishers
   // at once: a bus may send it as one piece. Any thread.
   virtual void flush() {}
 
@@ -25,7 +25,7 @@ class Bus {
   using Handler = std::function<void(const std::string& channel, const uint8_t* data, size_t size)>;
 
   // Starts to listen; once in a bus's life. `own` are the channels that this process publishes: a
-  // bus that hears itself can tell them from a stranger's.
+  // bus that hears itself can tell them from another process's.
   virtual void listen(const std::vector<std::string>& channels, Handler handler,
                       const std::vector<std::string>& own = {}) = 0;
 
@@ -61,7 +61,7 @@ class Bus {
   // Whether a message may get lost on its way to a listener that takes its messages.
   virtual bool loses_messages() const { return false; }
 
-  // Messages that could not be sent so far.
+  // Messages that could not be sent until now.
   virtual uint64_t failed() const { return 0; }
   // Messages that listeners did not get, since newer ones replaced them.
   virtual uint64_t replaced() const { return 0; }

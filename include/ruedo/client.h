@@ -4,13 +4,13 @@
 /// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
 /// microseconds. Everything here is safe to use from any thread. Link with ruedo::client.
 ///
-/// What cannot be done throws: Error and what derives from it, std::invalid_argument for a bad
-/// argument. What may be absent in good order is a std::optional. Nothing returns a code. A
+/// Failures throw: Error or a class derived from it, std::invalid_argument for a bad argument.
+/// Values that may rightly be absent are std::optional. Nothing returns an error code. A
 /// Duration is any of std::chrono's, or a number of seconds.
 ///
 /// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed,
-/// destroyed or moved from, whatever needs the server throws NoServer ("this simulation was
-/// closed"). So it does in the child of a fork, which connects for itself.
+/// destroyed or moved from, calls that need the server throw NoServer ("this simulation was
+/// closed"). So they do in the child of a fork, which connects for itself.
 //
 //     auto sim = ruedo::client::connect();
 //     auto robot = sim.robot("p3at");
@@ -42,9 +42,9 @@
 /// The client of a running simulation.
 namespace ruedo::client {
 
-// ---- What there is.
+// ---- Descriptions.
 
-/// What a robot is and can do.
+/// A robot's drive, limits and dimensions.
 struct RobotInfo {
   std::string name;                 ///< its own
   std::string model;                ///< that it was made of
@@ -106,10 +106,10 @@ struct MotionCore;
 /// Move-only.
 ///
 /// Once close() has returned, or the destructor, the callback is not called any more, and no call
-/// of it is under way (but for the one that closes it itself): what it refers to may go. Where
-/// callbacks in several threads close each other, the last of them does not wait for the others.
-/// What a callback throws is thrown by the next call of its simulation, and harms no other
-/// callback.
+/// of it is under way (but for the one that closes it itself): objects that it refers to may be
+/// destroyed. If callbacks in several threads close each other, the last one does not wait for the
+/// others. The next call of its simulation rethrows an exception of a callback, which harms no
+/// other callback.
 class [[nodiscard]] Subscription {
  public:
   Subscription() = default;  ///< Of nothing.
@@ -192,8 +192,8 @@ class Stream {
   /// @return its name on the bus
   [[nodiscard]] const std::string& channel() const;
 
-  /// The newest sample; before the first one it waits. What has come by the time of the call is
-  /// taken into account.
+  /// The newest sample; before the first one it waits. All samples that have arrived before the
+  /// call count.
   /// @param timeout of real time
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
@@ -206,13 +206,13 @@ class Stream {
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
-  /// The sample of a moment: waits until the stream has come so far. Where no sample is of that
-  /// moment, a pose or odometry is interpolated between its neighbours, and of other streams it is
-  /// the nearest. A stream keeps its last 256 samples, of 4 MB at most, from its first use on.
+  /// The sample of a time: waits until the stream has reached it. If no sample is of that time, a
+  /// pose or odometry is interpolated between its neighbours, and other streams return the nearest
+  /// sample. A stream keeps its last 256 samples, of 4 MB at most, from its first use on.
   /// @param utime us of sim time, such as `scan.utime`
   /// @param timeout of real time
   /// @return a copy
-  /// @throws Timeout, also for a moment before what is kept: Simulation::synchronised() joins
+  /// @throws Timeout, also for a time before the kept samples: Simulation::synchronised() joins
   /// streams from the beginning; TypeMismatch, NoServer
   [[nodiscard]] SampleType at(int64_t utime, Duration timeout = 5.0) const;
   /// @cond
@@ -237,9 +237,9 @@ class Stream {
   /// @return ends the calls when it goes
   /// @throws TypeMismatch, NoServer; std::invalid_argument for an empty function
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
-  /// How many samples latest() and next() have skipped, since newer ones had come or they were lost
-  /// on the way; and how many the channel's callbacks did not get, which were slower than the
-  /// samples came. A new Stream goes on from where the channel was last read, with its count.
+  /// The number of samples that latest() and next() have skipped, since newer ones had arrived or
+  /// they were lost on the way; and of those that the channel's callbacks were too slow for. A new
+  /// Stream continues from where the channel was last read, with its count.
   /// @return samples
   int64_t dropped() const;
   /// How many samples wait for next() and loops, from 1 (the newest alone, from which a channel
@@ -317,7 +317,7 @@ class MessageStream {
   /// @param channel names it in the error
   /// @param bytes LCM's encoding
   /// @return the message
-  /// @throws TypeMismatch when the bytes are no Message
+  /// @throws TypeMismatch if the bytes do not decode as a Message
   static Message decoded(const std::string& channel, const std::vector<uint8_t>& bytes) {
     const auto fail = [&](const char* what) -> Message {
       throw TypeMismatch(channel + ": a message of " + std::to_string(bytes.size()) + " bytes " +
@@ -336,7 +336,7 @@ class MessageStream {
   Stream<RawSample> raw_;
 };
 
-/// What step() saw: the state after its last step, and the sensor messages of all its steps.
+/// The observations of step(): the state after its last step, and all steps' sensor messages.
 struct Observations : State {
   /// A message as it came.
   struct Message {
@@ -546,8 +546,8 @@ class Motion {
   /// Waits until it is done.
   /// @param timeout of real time
   /// @return itself
-  /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot
-  /// goes on then; RunEnded; NoServer
+  /// @throws MotionError if it ended early or was refused; Timeout if it still runs: the robot
+  /// continues then; RunEnded; NoServer
   const Motion& wait(Duration timeout = kForever) const;
 
  private:
@@ -810,7 +810,7 @@ struct SpawnOptions {
   double z = 0.0;         ///< m
 };
 
-/// What Simulation::reset() sets back.
+/// The parts that Simulation::reset() resets.
 enum class Reset {
   all,   ///< what follows equals a fresh run
   time,  ///< sim time starts at 0 again; nothing moves
@@ -862,7 +862,7 @@ class [[nodiscard]] Simulation : public Requests {
   ~Simulation();
   /// @endcond
 
-  /// @name What runs
+  /// @name The run
   /// They throw NoServer once this was closed or moved from.
   /// @{
   [[nodiscard]] std::string url() const;      ///< @return where the server is
@@ -888,9 +888,9 @@ class [[nodiscard]] Simulation : public Requests {
   /// @param time of sim time
   /// @throws NoServer
   void sleep(Duration time) const;
-  /// A loop at a period of sim time: `for (double t : sim.every(0.1))` goes on at each multiple of
-  /// it, with the time (s) of that moment, and leaves out those that have passed while the loop's
-  /// body ran. Ends with the run.
+  /// A loop at a period of sim time: `for (double t : sim.every(0.1))` iterates at each multiple of
+  /// it, with its time (s), and skips those that have passed while the loop's body ran. Ends with
+  /// the run.
   /// @param period of sim time, above 0
   /// @return the loop's range
   /// @throws std::invalid_argument; NotSupported in lockstep; NoServer
@@ -919,17 +919,17 @@ class [[nodiscard]] Simulation : public Requests {
   /// Those of Requests, and these, which throw what those do.
   /// @{
 
-  /// Takes n steps and returns what was seen.
+  /// Takes n steps and returns the observations.
   ///
   /// In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with
   /// their commands, and has every message of every step; the first call's observations begin with
   /// those of the state it found. Else it steps a paused simulation; there are no commands, and the
   /// messages are in the streams.
-  /// @param n how many; 0 takes none
+  /// @param n number of steps; 0 takes none
   /// @param commands in lockstep, for these steps
-  /// @param timeout of real time, each time that nothing goes on
+  /// @param timeout of real time, each time that nothing advances
   /// @return the state after the last step, and in lockstep the messages of all
-  /// @throws LeaseLost when the others went on without this client; Timeout
+  /// @throws LeaseLost if the other clients continued without this one; Timeout
   Observations step(int64_t n = 1, const std::vector<Command>& commands = {},
                     Duration timeout = 60.0) const;
   /// @param what is reset
@@ -983,10 +983,10 @@ class [[nodiscard]] Simulation : public Requests {
   void markers(const std::string& layer, const std::vector<Marker>& markers = {},
                const std::string& frame = "") const;
 
-  /// Sends a message to the server and to whoever listens at url().
+  /// Sends a message to the server and to all listeners at url().
   /// @param channel such as "p3at/velocity"; in lockstep commands belong to step()
   /// @param bytes LCM's encoding of it
-  /// @throws NoServer; Error for more than a server takes
+  /// @throws NoServer; Error for a message that is too large
   void publish(const std::string& channel, const std::vector<uint8_t>& bytes) const;
   /// The same with an object of a class that lcm-gen made.
   /// @param channel as above
@@ -1073,7 +1073,7 @@ Simulation launch(const std::string& world, const LaunchOptions& options = {});
 
 class LogFile;  // clients/cpp/log.cpp
 
-/// What a run recorded (`ruedo run --record`), or any other log of LCM's: its messages by channel.
+/// The log of a run (`ruedo run --record`), or any other log of LCM: its messages by channel.
 /// They are read from the file on demand, so that a log of any size is opened at once. Copies share
 /// the file. Thread safe.
 class Log {
@@ -1142,8 +1142,8 @@ class Log {
 };
 
 /// @param path a file
-/// @return what it has
-/// @throws Error for what cannot be read, and what is no log
+/// @return its messages
+/// @throws Error if the file cannot be read, or is not a log
 Log read_log(const std::string& path);
 
 }  // namespace ruedo::client

@@ -24,8 +24,8 @@ class Map {
   /// @param columns cells in a row
   /// @param resolution m, of a cell
   /// @param origin of the first cell's corner
-  /// @throws std::invalid_argument for cells that are no whole rows, or a resolution that is not
-  /// above 0
+  /// @throws std::invalid_argument for cells that do not fill whole rows, or a resolution that is
+  /// not above 0
   Map(std::vector<int8_t> cells, size_t columns, double resolution, const Origin& origin);
   [[nodiscard]] const std::vector<int8_t>& cells() const { return cells_; }  ///< @return by rows
   size_t columns() const { return columns_; }               ///< @return cells in a row
@@ -40,10 +40,10 @@ class Map {
   /// @return whether that place is occupied
   [[nodiscard]] bool occupied(double x, double y) const { return at(x, y) == 100; }
   /// @return by rows: m from the middle of each cell to that of the nearest occupied one; +inf
-  /// where there is none. Exact (Felzenszwalb and Huttenlocher 2012, by rows and then columns)
+  /// without one. Exact (Felzenszwalb and Huttenlocher 2012, by rows and then columns)
   [[nodiscard]] std::vector<double> distance_field() const;
   /// @param radius m, of a robot
-  /// @return the map in which every cell is occupied that is at most so far from an occupied one
+  /// @return the map in which every cell within that radius of an occupied one is occupied
   [[nodiscard]] Map inflated(double radius) const;
   /// @param x m, world
   /// @param y m, world

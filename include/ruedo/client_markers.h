@@ -1,4 +1,4 @@
-// What a program draws in the world for people to see, in the web console and in logs: what
+// Drawings of a program in the world, which the web console and logs show: the markers that
 // Simulation::markers() takes.
 //
 // Points are in m; a color is red, green, blue, alpha, each from 0 to 1.
@@ -38,7 +38,7 @@ Marker lines(Points points, const Color& color = kBlue, double width = 0.03);
 Marker path(Points points, const Color& color = kBlue, double width = 0.03);
 // size: m.
 Marker points(Points points, const Color& color = kBlue, double size = 0.05);
-// Faces who looks, its lines so high (m).
+// A text that faces the viewer; height: of a line, m.
 Marker text(std::string text, const std::array<double, 3>& place, const Color& color = kBlue,
             double height = 0.2);
 // An occupancy grid: rows of cells along x from 0 (free) to 100 (occupied), 255 unknown; the first

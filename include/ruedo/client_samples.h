@@ -1,5 +1,5 @@
 /// @file
-// What Ruedo's client for C++ delivers and throws: samples and errors. ruedo/client.h includes it.
+// Samples and errors of Ruedo's client for C++. ruedo/client.h includes it.
 //
 // SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
 // microseconds.
@@ -14,7 +14,7 @@
 
 namespace ruedo::client {
 
-// ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
+// ---- Errors. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
 
 /// Whatever else can go wrong; the text says what.
 struct Error : std::runtime_error {
@@ -62,7 +62,7 @@ struct RequestError : Error {
   /// @endcond
   ReplyCode code;  ///< why
 };
-/// Lockstep goes on without this client, which was silent too long; the next step() takes part
+/// Lockstep continues without this client, which was silent too long; the next step() takes part
 /// again.
 struct LeaseLost : RequestError {
   using RequestError::RequestError;

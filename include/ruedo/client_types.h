@@ -1,5 +1,5 @@
 /// @file
-// What samples of Ruedo's client for C++ are made of.
+// The parts of samples of Ruedo's client for C++.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ class Duration : public std::chrono::duration<double> {
  public:
   /// @param seconds may be kForever
   constexpr Duration(double seconds)
-      : std::chrono::duration<double>(seconds) {}  // NOLINT: both are meant to convert
+      : std::chrono::duration<double>(seconds) {}  // NOLINT: both convert on purpose
   /// @param time of std::chrono
   template <class Rep, class Period>
   constexpr Duration(std::chrono::duration<Rep, Period> time)
@@ -59,7 +59,7 @@ struct Transform {
   [[nodiscard]] Vector3 apply(const Vector3& point) const;
 };
 
-/// What all samples have.
+/// The members of all samples.
 struct Sample {
   int64_t utime = 0;  ///< us, sim time of the state shown
   /// @return the same in s

@@ -1,9 +1,9 @@
-// What the author of a drive writes against: how fast a base really goes for what it is asked. A
-// drive is one source file: a class derived from DriveModel, and one registration at its end.
+// The interface for authors of drives: the real velocity of a base for a commanded one. A drive is
+// one source file: a class derived from DriveModel, and one registration at its end.
 // docs/plugins.md is the story.
 //
 // Commands, limits, motion primitives, the watchdog and contacts stay Ruedo's: a DriveModel stands
-// between what the plan wants in a step and what the wheels do. What it returns holds as long as
+// between the planned velocity of a step and the motion of the wheels. Its result holds as long as
 // nothing is touched; against contacts the base pushes with the drive's force, as the kinematic
 // drive does.
 #pragma once
@@ -34,7 +34,7 @@ struct DriveSetup {
   double step_s;      ///< length of a step, s
 };
 
-/// What a drive is given for a step.
+/// The input of a drive for a step.
 struct DriveInput {
   SimTime time;         ///< us, at the beginning of the step
   BaseVelocity asked;   ///< mean over the step, by the command in force, within the robot's limits
@@ -48,9 +48,9 @@ class DriveModel {
  public:
   virtual ~DriveModel() = default;
   /// Called once a step, in order; not while the robot rests.
-  /// @param input what is asked, and how it goes
+  /// @param input the commanded velocity, and the current one
   /// @return the mean velocity of base_link over the step
-  /// @throws std::exception ends the run, which says the text
+  /// @throws std::exception ends the run, which prints its text
   virtual BaseVelocity step(const DriveInput& input) = 0;
   /// For snapshots of an engine: becomes what another one is, the same robot's in another copy of
   /// the world. Where all that it keeps are values: `*this = static_cast<const MyDrive&>(other)`.

@@ -53,8 +53,8 @@ struct Allowed {
 /// An element of a file, with its children.
 ///
 /// Reads take the path of a child: its name, or several with '/' between them, "scan/horizontal".
-/// Of several children of one name the first is read. Where there is none, the read gives its
-/// fallback. Reads throw InputError for what is not of the type (trailing characters, NaN and
+/// Of several children of one name the first is read. Without one, the read returns its fallback.
+/// Reads throw InputError for a value that is not of the type (trailing characters, NaN and
 /// infinity included) or not allowed. Numbers are read the same in every locale: "1,5" is refused.
 class Element {
  public:
@@ -99,7 +99,7 @@ class Element {
   /// @param path of a child
   /// @param fallback where it is absent
   /// @return whether the child's text is true or 1, not false or 0
-  /// @throws InputError when it is none of these
+  /// @throws InputError if it is another text
   bool boolean(std::string_view path, bool fallback) const;
   /// @param path of a child
   /// @param fallback where it is absent
@@ -108,7 +108,7 @@ class Element {
   /// @param path of a child
   /// @param fallback where it is absent
   /// @return the child's text as a rate in Hz
-  /// @throws InputError when it is none
+  /// @throws InputError if it is not a rate
   Rate rate(std::string_view path, Rate fallback) const;
   /// @param path of a child
   /// @param fallback where it is absent
@@ -119,13 +119,13 @@ class Element {
   /// @param path of a child
   /// @param fallback where it is absent
   /// @return the child's text as a pose: "x y z roll pitch yaw", with degrees="true" in degrees
-  /// @throws InputError when it is none
+  /// @throws InputError if it is not a pose
   Pose pose(std::string_view path, const Pose& fallback = {}) const;
   /// @param path of a child
   /// @param fallback where it is absent
-  /// @param choices what the child's text may be
+  /// @param choices the allowed texts
   /// @return the child's text
-  /// @throws InputError when it is none of the choices, which the error lists
+  /// @throws InputError that lists the choices, if it is another text
   std::string choice(std::string_view path, std::string_view fallback,
                      const std::vector<std::string>& choices) const;
 
@@ -138,7 +138,7 @@ class Element {
   /// @throws InputError for other text, or for a value that is not allowed
   int64_t as_integer(Allowed allowed) const;
   /// @return whether this element's own text is true or 1, not false or 0
-  /// @throws InputError when it is none of these
+  /// @throws InputError if it is another text
   bool as_boolean() const;
   /// @param allowed the values of each number
   /// @return this element's own text as three numbers
@@ -149,12 +149,12 @@ class Element {
   /// @throws InputError when it is not, or one is not allowed
   std::vector<double> as_numbers(Allowed allowed) const;
   /// @return this element's own text as a pose, as pose() reads it
-  /// @throws InputError when it is none
+  /// @throws InputError if it is not a pose
   Pose as_pose() const;
 
-  /// Refuses children that nobody reads.
+  /// Refuses children that are not read.
   /// @param known names of children that are read
-  /// @param only_ruedo look at those of the ruedo: namespace alone
+  /// @param only_ruedo checks only children of the ruedo: namespace
   /// @throws InputError that names the child, and the nearest known name
   void refuse_unknown(const std::vector<std::string>& known, bool only_ruedo = true) const;
 

@@ -30,7 +30,7 @@
 
 namespace ruedo {
 
-/// What an Engine is made with; the lists are as the options of `ruedo run`.
+/// The options of an Engine; the lists are as the options of `ruedo run`.
 struct EngineOptions {
   int worlds = 1;     ///< copies
   uint64_t seed = 1;  ///< of copy 0; copy i has seed + i
@@ -163,11 +163,11 @@ class Engine {
   /// @param n 1 or more
   /// @throws std::invalid_argument; std::runtime_error when a sensor or a drive failed
   void step(int64_t n = 1);
-  /// The same after velocities for every driven robot of every copy, on the states that there are.
+  /// The same after velocities for every driven robot of every copy, on the current states.
   /// @param n 1 or more
-  /// @param velocities worlds x robots x (m/s ahead, m/s left, rad/s), row by row; a NaN is no
-  /// command: what was commanded before holds, until the robot's watchdog
-  /// @throws std::invalid_argument when it has another size
+  /// @param velocities worlds x robots x (m/s ahead, m/s left, rad/s), row by row; a NaN gives no
+  /// command: the earlier one holds, until the robot's watchdog
+  /// @throws std::invalid_argument if it has another size
   void step(int64_t n, const std::vector<double>& velocities);
 
   /// A message on one of the channels that take commands ("p3at/move"), on the state that the copy

@@ -1,4 +1,4 @@
-// What can be wrong with input, in words that a user can act on.
+// Errors and findings of input, in words that a user can act on.
 #pragma once
 
 #include <stdexcept>
@@ -48,7 +48,7 @@ class EnvironmentError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Something that a loader noticed and went on from.
+/// A fault that a loader noticed, and continued.
 struct Finding {
   /// Not supported, wrong and repaired, or wrong.
   enum class Kind { unsupported, repaired, error };
@@ -87,8 +87,8 @@ class Findings {
   /// @param element its path
   /// @param text what was found, and what Ruedo does instead
   void error(const InputError& caught, const std::string& element, const std::string& text);
-  /// From now on a number that is not finite is no finding, but ends the reading with its
-  /// NotFinite: for those who would not hear of a finding.
+  /// From now on a number that is not finite gives no finding, but ends the reading with its
+  /// NotFinite: for callers that read no findings.
   void refuse_what_is_not_finite() { refuses_not_finite_ = true; }
   /// @return all of them, in the order of adding
   const std::vector<Finding>& list() const { return list_; }

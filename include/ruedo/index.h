@@ -1,15 +1,15 @@
-// Typed indices: an index into one kind of list does not pass for an index into another.
+// Typed indices: an index into one kind of list does not convert to an index into another.
 //
-// Bodies, links, joints, wheels, robots and models lie in lists and are named by their places in
-// them. A place is a BodyIndex, a LinkIndex and so on, and a list that is an IndexedVector takes
-// its own kind alone:
+// Bodies, links, joints, wheels, robots and models lie in lists and are identified by their
+// indices: a BodyIndex, a LinkIndex and so on. A list that is an IndexedVector takes only its own
+// kind:
 //
 //   IndexedVector<BodyIndex, Pose> poses;
 //   poses[link.body];   // a BodyIndex
 //   poses[link.index];  // a LinkIndex: does not compile
 //
-// As Drake's TypeSafeIndex, an index turns into an int by itself, as messages and arrays want it,
-// and an int into an index only where that is written down.
+// As Drake's TypeSafeIndex, an index converts to an int implicitly, for messages and arrays, and an
+// int to an index only explicitly.
 #pragma once
 
 #include <compare>
@@ -51,7 +51,7 @@ class Index {
   int value_ = -1;
 };
 
-/// A list whose elements are named by an index of one kind. Loops that count in size_t may go on.
+/// A list whose elements have an index of one kind. Loops may still count in size_t.
 template <typename ItsIndex, typename T>
 class IndexedVector : public std::vector<T> {
   using Base = std::vector<T>;

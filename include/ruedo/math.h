@@ -2,8 +2,8 @@
 //
 // The C library's pick other code where a CPU has fused multiply-adds, and change with its
 // versions. These are musl's, linked in, and an arc tangent of two arguments of our own; each is
-// within 1 ulp (tests/base/test_math.cpp holds them to MPFR). What computes a result calls these
-// and never <cmath>'s; sqrt, fmod, remainder, floor and the like are exact in every library and
+// within 1 ulp (tests/base/test_math.cpp compares them with MPFR). Code that computes results calls
+// these, never <cmath>'s; sqrt, fmod, remainder, floor and the like are exact in every library and
 // stay.
 #pragma once
 

@@ -1,8 +1,8 @@
-// The physical quantities that files and messages give, each with the largest amount that is taken.
+// The physical quantities that files and messages give, each with the largest accepted amount.
 // The table is shown in docs/limits.md.
 //
 // The maxima are far beyond what robots need, and small enough that products of any few of them are
-// finite: a force on a mass, a speed on an arm. So what is read never becomes an infinity or a NaN
+// finite: a force on a mass, a speed on an arm. So no input becomes an infinity or a NaN
 // later on.
 #pragma once
 

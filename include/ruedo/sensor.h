@@ -1,8 +1,8 @@
-// What a sensor's author writes against. A sensor is one source file in src/sensors: a class
+// The interface for authors of sensors. A sensor is one source file in src/sensors: a class
 // derived from Sensor, and one registration at its end. docs/adding-a-sensor.md is the story.
 //
 // Life of a sensor: made once from its element; then, in its module's thread, observe() for every
-// step (only when it asks for that) and sample() at the steps that its rate says. Devices of one
+// step (only if it requests that) and sample() at the steps of its rate. Devices of one
 // module may run in parallel with each other, never with themselves. A sensor reads the snapshot,
 // its configuration and its own state, and nothing else: no clock, no other device, no shared
 // generator.
@@ -116,7 +116,7 @@ struct SensorSetup {
   }
 };
 
-/// What a sensor is given for a sample.
+/// The input of a sensor for a sample.
 struct SampleInput {
   const Snapshot& snapshot;     ///< the state that it measures
   int64_t sample;               ///< its index, from 0
@@ -195,8 +195,8 @@ struct SensorKind {
   Rate default_rate;               ///< where the file says none
   bool needs_rays = false;         ///< SampleInput::rays of the collisions
   bool needs_visual_rays = false;  ///< SampleInput::rays of the visuals
-  /// Pictures: a sample depends on no other one, for those that nobody reads are not taken. A
-  /// sensor whose samples do observes().
+  /// Pictures: a sample depends on no other one, since samples without a reader are not taken. A
+  /// sensor whose samples depend on each other observes().
   bool needs_renderer = false;
   std::function<std::unique_ptr<Sensor>(const SensorSetup&)> make;  ///< may throw InputError
   std::string kind = {};  ///< as ruedo/info names it; empty: the module's name

@@ -1,5 +1,5 @@
 /// @file
-// What a setting of a world is set to. ruedo/client.h and ruedo/engine.h include it.
+// The value of a setting of a world. ruedo/client.h and ruedo/engine.h include it.
 #pragma once
 
 #include <charconv>
@@ -15,7 +15,7 @@ class Setting {
   /// @tparam Number bool, or any type of numbers
   /// @param value of that type
   template <class Number, class = std::enable_if_t<std::is_arithmetic_v<Number>>>
-  Setting(Number value) {  // NOLINT: it is meant to convert, as the next two are
+  Setting(Number value) {  // NOLINT: converts on purpose, as the next two do
     if constexpr (std::is_same_v<Number, bool>) {
       text_ = value ? "true" : "false";
     } else {

@@ -26,7 +26,7 @@ struct Rate {
   friend bool operator==(const Rate&, const Rate&) = default;
 };
 
-// Says at which steps a device takes its samples. Sample k (from 0, the initial state) is taken at
+// Schedules the samples of a device. Sample k (from 0, the initial state) is taken at
 // the first step whose time is at least phase + k / rate.
 class SampleClock {
  public:

@@ -90,15 +90,15 @@ class ContactList {
   Shared resting_;
 };
 
-// A contact of a robot with what it runs into: with something that is no part of it, that does not
-// carry it and does not lie on it.
+// A contact of a robot with an obstacle: not a part of it, nor the ground that carries it, nor a
+// load on it.
 struct Collision {
   RobotIndex robot;
   ContactIndex contact;
   bool as_a = true;  // the robot's is link_a
 };
 
-// What a robot's drive is executing; the members are motion_status_t's, but for the last two.
+// The motion that a robot's drive executes; as motion_status_t, but for the last two members.
 struct MotionState {
   int64_t id = 0;
   int8_t kind = 0, state = 0, reason = 0;
@@ -107,7 +107,7 @@ struct MotionState {
   int64_t changes = 0;  // counts the changes of id, kind, state and reason, and the MotionEnds
 };
 
-// What came to its end by a command in this step: a primitive that it replaced, or the command
+// The motion that a command ended in this step: a primitive that it replaced, or the command
 // itself, refused.
 struct MotionEnd {
   RobotIndex robot;

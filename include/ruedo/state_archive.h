@@ -5,9 +5,9 @@
 //
 //   void exchange(StateArchive& archive) { archive(time_, velocity_, noises_); }
 //
-// What the constructor makes is not in it. The bytes are for the build that wrote them alone, and
-// trusted: who reads them has made sure whose they are (system/seal.h). Lengths are checked all
-// the same.
+// Members that the constructor sets are not in it. Only the build that wrote the bytes reads them,
+// and trusts them: the reader has checked their seal (system/seal.h). Lengths are checked all the
+// same.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +50,7 @@ inline constexpr bool kStateBytes<RobotState> = true;
 template <>
 inline constexpr bool kStateBytes<MotionEnd> = true;
 
-/// Why a state cannot be written, or what was read is none.
+/// A state cannot be written, or the bytes are not a state.
 struct ArchiveError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
