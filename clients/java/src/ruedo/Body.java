@@ -2,16 +2,16 @@ package ruedo;
 
 /**
  * A set of links that do not move against each other, from {@link Simulation#bodies}; or a model,
- * from {@link Simulation#body}. pose() and its like ask the server, and throw what a request does.
+ * from {@link Simulation#body}. pose() and its like send a request, and throw its exceptions.
  */
 public final class Body {
     /** MODEL/LINK, or MODEL. */
     public final String name;
 
-    /** True when it never moves. */
+    /** Whether it never moves. */
     public final boolean isStatic;
 
-    /** kg; 0 of what never moves. */
+    /** kg; 0 of a body that never moves. */
     public final double mass;
 
     private final Simulation sim; // null: in ruedo/info
@@ -27,19 +27,19 @@ public final class Body {
         this.mass = mass;
     }
 
-    /** In the world, as it is now. */
+    /** The current pose in the world. */
     public Transform pose() {
         State state = sim.state(name);
         return new Transform(state.position, state.orientation);
     }
 
-    /** In the world, as it moves now. */
+    /** The current twist in the world. */
     public Twist twist() {
         State state = sim.state(name);
         return new Twist(state.linear, state.angular);
     }
 
-    /** Puts the model somewhere in the world, at rest. */
+    /** Sets the model's pose in the world, at rest. */
     public void setPose(Transform pose) {
         sim.setPose(name, pose.position(), pose.orientation());
     }

@@ -3,10 +3,7 @@ package ruedo;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 
-/**
- * A camera; its further channels, where the world file asks for them. They throw UnknownName where
- * it does not.
- */
+/** A camera, with its further channels if the world file has them; else they throw UnknownName. */
 public final class Camera extends Device<Image> {
     Camera(StreamCore<Image> core, device_info_t info, channel_info_t channel) {
         super(core, info, channel);

@@ -1,14 +1,14 @@
 package ruedo;
 
 /**
- * A command for {@link Simulation#step(long, java.util.List)}, as {@link Robot#velocityCommand} and
- * its like make it.
+ * A command for {@link Simulation#step(long, java.util.List)}, from {@link Robot#velocityCommand}
+ * and its like.
  */
 public final class Command {
     /** One of the command channels of ruedo/info. */
     public final String channel;
 
-    /** Steps from where the call begins to the state that it acts on. */
+    /** Number of steps from the call's first state to the one that it acts on. */
     public final long after;
 
     final byte[] data;

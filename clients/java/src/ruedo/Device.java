@@ -12,7 +12,7 @@ public class Device<T extends Sample> extends Stream<T> {
     /** Name of the robot. */
     public final String robot;
 
-    /** As in the world file. */
+    /** Its name in the world file. */
     public final String name;
 
     /** "lrf", "sonar", "odometry", "camera", "pose", "motion", "imu", "contact", ... */
@@ -45,7 +45,7 @@ public class Device<T extends Sample> extends Stream<T> {
     /** A sonar's transducers: x, y, z (m), roll, pitch, yaw (rad) in the device's frame. */
     public final double[][] elements;
 
-    /** Its frame in base_link at the start. */
+    /** The device's frame in base_link at the start. */
     public Transform transform() {
         return new Transform(position, orientation);
     }

@@ -4,7 +4,7 @@ import java.util.Map;
 
 /** A joint of a robot, from {@link Robot#joint}. Thread safe. */
 public final class Joint {
-    /** As the file has it. */
+    /** Its name in the file. */
     public final String name;
 
     /** "revolute", "continuous", "prismatic", ... */
@@ -22,12 +22,12 @@ public final class Joint {
     /** N m or N; +inf: no limit. */
     public final double maxEffort;
 
-    /** False of a joint that mimics another, of a gearbox and of a ball joint. */
+    /** Whether it takes commands: not a joint that mimics another, a gearbox or a ball joint. */
     public final boolean takesCommands;
 
     /**
-     * True where the file has a controller, a transmission or a servo for it: it holds its position
-     * until its first command. The others are free until then.
+     * Whether the file has a controller, a transmission or a servo for it: then it holds its
+     * position until its first command. Other joints are free until then.
      */
     public final boolean holds;
 
@@ -61,8 +61,8 @@ public final class Joint {
     }
 
     /**
-     * Commands it to a position (rad or m) within its limits, which it holds until its next
-     * command. Throws NotSupported in lockstep.
+     * Commands a position (rad or m) within its limits, which it holds until its next command.
+     * Throws NotSupported in lockstep.
      */
     public void setPosition(double value) {
         robot.commandJoints(Map.of(name, value), JointMode.POSITION);

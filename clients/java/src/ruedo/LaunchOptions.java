@@ -22,7 +22,7 @@ public final class LaunchOptions {
     double timeout = 30.0;
     boolean verbose;
 
-    /** Of the random numbers; default: the server's. */
+    /** Seed of the random numbers; default: the server's. */
     public LaunchOptions seed(long seed) {
         this.seed = seed;
         return this;
@@ -34,7 +34,7 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** How many clients the run waits for; default 0: it is not in lockstep. */
+    /** Number of clients that the run waits for; default 0: not in lockstep. */
     public LaunchOptions lockstep(int clients) {
         lockstep = clients;
         return this;
@@ -52,13 +52,13 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** A setting beside those that were set before: setting("p3at/lrf.update_rate", 20). */
+    /** Adds a setting: setting("p3at/lrf.update_rate", 20). */
     public LaunchOptions setting(String key, Object value) {
         settings.add(key + "=" + value);
         return this;
     }
 
-    /** The same of several: settings(Map.of("p3at/lrf.update_rate", 20)). */
+    /** Adds several settings: settings(Map.of("p3at/lrf.update_rate", 20)). */
     public LaunchOptions settings(Map<String, ?> values) {
         new TreeMap<>(values).forEach(this::setting);
         return this;
@@ -74,7 +74,7 @@ public final class LaunchOptions {
         return setting(key, value);
     }
 
-    /** False: ideal values. */
+    /** Whether sensors have noise; false: ideal values. */
     public LaunchOptions noise(boolean noise) {
         this.noise = noise;
         return this;
@@ -85,13 +85,13 @@ public final class LaunchOptions {
         return more("--duration", Double.toString(seconds));
     }
 
-    /** It starts paused, at step 0. */
+    /** Starts the run paused, at step 0. */
     public LaunchOptions paused() {
         more.add("--paused");
         return this;
     }
 
-    /** The file of a log. */
+    /** Records the run into this file. */
     public LaunchOptions record(String file) {
         return more("--record", file);
     }
@@ -106,7 +106,7 @@ public final class LaunchOptions {
         return more("--drive", drives);
     }
 
-    /** What goes wrong: "p3at/lrf:freeze@3". */
+    /** Faults to inject: "p3at/lrf:freeze@3". */
     public LaunchOptions fault(String... faults) {
         return more("--fault", faults);
     }
@@ -126,7 +126,7 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** The world's SDF or URDF itself, where the world is "". */
+    /** The SDF or URDF text of the world, if the world's name is "". */
     public LaunchOptions text(String text) {
         this.text = text;
         return this;
@@ -147,7 +147,7 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** Of this client; default "client". */
+    /** Name of this client; default "client". */
     public LaunchOptions name(String name) {
         this.name = name;
         return this;
@@ -159,7 +159,7 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** True: show all that the server prints; else its warnings alone. */
+    /** Whether to show all output of the server; else only its warnings. */
     public LaunchOptions verbose(boolean verbose) {
         this.verbose = verbose;
         return this;

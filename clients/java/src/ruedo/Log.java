@@ -8,8 +8,8 @@ import java.util.TreeMap;
 import java.util.function.Consumer;
 
 /**
- * What a run recorded: its messages by channel. They are read from the file when they are asked
- * for, so that a log of any size is opened at once. {@link Ruedo#readLog} makes it. Thread safe.
+ * The log of a run: its messages by channel. They are read from the file on demand, so that a log
+ * of any size is opened at once. {@link Ruedo#readLog} makes it. Thread safe.
  */
 public final class Log {
     private static final double ALWAYS = Double.POSITIVE_INFINITY;
@@ -56,8 +56,8 @@ public final class Log {
     }
 
     /**
-     * "" where the file ends properly; else how it was cut off or is damaged, and at which byte.
-     * What came before that is here.
+     * "" if the file ends properly; else its truncation or damage, and at which byte. The messages
+     * before that are readable.
      */
     public String fault() {
         counts();
@@ -66,7 +66,7 @@ public final class Log {
 
     /**
      * The samples on a channel, in order: {@code log.samples("p3at/lrf", Scan.class)}. Throws
-     * UnknownName, with the channels that there are; TypeMismatch.
+     * UnknownName, with the log's channels; TypeMismatch.
      */
     public <T extends Sample> List<T> samples(String channel, Class<T> kind) {
         List<T> samples = new ArrayList<>();
@@ -76,8 +76,8 @@ public final class Log {
 
     /**
      * Calls {@code use} with each sample on a channel from {@code begin} to {@code end}, s of the
-     * log's time, both included, in order: of a log of any size one is in memory. What comes before
-     * is not read; infinities stand for the log's beginning and end. Throws as {@link #samples}.
+     * log's time, both included, in order: of a log of any size one is in memory. Earlier messages
+     * are not read; infinities mean the log's beginning and end. Throws as {@link #samples}.
      */
     public <T extends Sample> void each(
             String channel, Class<T> kind, double begin, double end, Consumer<? super T> use) {

@@ -7,9 +7,9 @@ import java.nio.charset.StandardCharsets;
 import java.util.List;
 
 /**
- * What a program draws in the world for people to see, in the web console and in logs: what {@link
- * Simulation#markers} takes. Points are x, y, z in m; a color is red, green, blue, alpha, each from
- * 0 to 1. What the server would refuse throws IllegalArgumentException.
+ * A drawing of a program in the world, for {@link Simulation#markers}; the web console and logs
+ * show it. Points are x, y, z in m; a color is red, green, blue, alpha, each from 0 to 1. Values
+ * that the server would refuse throw IllegalArgumentException.
  */
 public final class Marker {
     private static final int MOST_BYTES = 65536;
@@ -57,7 +57,7 @@ public final class Marker {
         return new Marker(marker_t.POINTS, color, size).withPoints(points);
     }
 
-    /** Faces who looks, its lines so high (m). */
+    /** A text that faces the viewer; height: of a line, m. */
     public static Marker text(String text, double[] place, float[] color, double height) {
         require(
                 text.getBytes(StandardCharsets.UTF_8).length <= MOST_TEXT,

@@ -13,7 +13,7 @@ import java.lang.reflect.InvocationTargetException;
  * @param <M> the class that lcm-gen made of its .lcm file; byte[] where none was given
  */
 public final class MessageSample<M> extends Sample {
-    /** As lcm-gen's class decodes it; the bytes themselves where none was given. */
+    /** The message, decoded by lcm-gen's class; the bytes themselves without one. */
     public final M message;
 
     /** LCM's encoding, the type's fingerprint first. */

@@ -13,7 +13,7 @@ public final class Motion {
     private static final int UNSEEN_STATUSES = 20;
     private static final double UNSEEN_SECONDS = 5.0;
 
-    /** As {@link MotionStatus#id} shows it. */
+    /** Its number, as in {@link MotionStatus#id}. */
     public final long id;
 
     private final Simulation sim;
@@ -44,7 +44,7 @@ public final class Motion {
         remaining = amount;
     }
 
-    /** True when the robot is not executing it any more, for whatever reason. */
+    /** Whether it has ended, for whatever reason. */
     public boolean done() {
         synchronized (lock) {
             return state.equals("done") || state.equals("ended") || state.equals("refused");
@@ -59,8 +59,9 @@ public final class Motion {
     }
 
     /**
-     * Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run":
-     * its robot, its run is gone; "lost": no status has shown it, though others came.
+     * The reason why it ended early or was refused, as in {@link MotionStatus#reason}; "removed":
+     * its robot is gone; "new run": its run is gone; "lost": no status has shown it, though others
+     * came.
      */
     public String reason() {
         synchronized (lock) {
@@ -68,7 +69,7 @@ public final class Motion {
         }
     }
 
-    /** The body that blocked it; "": none did. */
+    /** The body that blocked it; "" if none did. */
     public String blockedBy() {
         synchronized (lock) {
             return blockedBy;

@@ -6,9 +6,12 @@ import java.util.HashMap;
 import java.util.List;
 import java.util.Map;
 
-/** What a step saw: the state after its last step, and the sensor messages of all its steps. */
+/**
+ * The observations of a step: the state after its last step, and the sensor messages of all its
+ * steps.
+ */
 public final class Observations extends State {
-    /** A sensor message as it came. */
+    /** A sensor message, undecoded. */
     public static final class Message {
         /** Number of the state. */
         public final long step;

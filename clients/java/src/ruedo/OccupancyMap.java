@@ -72,8 +72,8 @@ public final class OccupancyMap {
     }
 
     /**
-     * By rows: m from the middle of each cell to that of the nearest occupied one; +inf where there
-     * is none. Exact (Felzenszwalb and Huttenlocher 2012, by rows and then columns).
+     * By rows: m from the middle of each cell to that of the nearest occupied one; +inf without
+     * one. Exact (Felzenszwalb and Huttenlocher 2012, by rows and then columns).
      */
     public double[][] distanceField() {
         int rows = cells.length, columns = cells[0].length;
@@ -99,7 +99,7 @@ public final class OccupancyMap {
         return nearest;
     }
 
-    /** The map in which every cell is occupied that is at most so far (m) from an occupied one. */
+    /** The map in which every cell within a radius (m) of an occupied one is occupied. */
     public OccupancyMap inflated(double radius) {
         double[][] away = distanceField();
         byte[][] grown = new byte[cells.length][];
@@ -112,9 +112,9 @@ public final class OccupancyMap {
     }
 
     /**
-     * How far a ray goes (m) from a place (m) in a direction (rad, of the world) until it enters an
-     * occupied cell: +inf where it meets none within maxRange, 0 from within one. Goes from cell to
-     * cell (Amanatides and Woo 1987).
+     * The distance (m) that a ray travels from a place (m) in a direction (rad, of the world) until
+     * it enters an occupied cell: +inf if it meets none within maxRange, 0 from within one. Goes
+     * from cell to cell (Amanatides and Woo 1987).
      */
     public double ray(double fromX, double fromY, double angle, double maxRange) {
         double[] start = toCells(fromX, fromY);

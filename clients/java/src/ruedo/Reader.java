@@ -46,7 +46,7 @@ public class Reader<T extends Sample> implements Iterable<T> {
     }
 
     /**
-     * What next() returns, again and again, until the run ends: for (Scan scan : robot.lrf()). A
+     * Iterates over the results of next(), until the run ends: for (Scan scan : robot.lrf()). A
      * loop slower than the stream gets the newest sample each time, or the oldest of queueDepth().
      */
     @Override
@@ -60,9 +60,9 @@ public class Reader<T extends Sample> implements Iterable<T> {
     }
 
     /**
-     * How many samples wait for next() and loops, from 1 (the newest alone, from which a stream
-     * starts) to 1000. With more, next() returns the oldest that waits; where more than that came
-     * meanwhile, the oldest go, and dropped() counts them.
+     * The number of samples that are kept for next() and loops, from 1 (only the newest; the
+     * default) to 1000. With more, next() returns the oldest kept sample; if more arrive, the
+     * oldest are dropped, and dropped() counts them.
      */
     public int queueDepth() {
         return samples.queueDepth(place);

@@ -21,7 +21,7 @@ import java.util.function.Consumer;
  * safe.
  */
 public final class Robot {
-    /** As in the world file. */
+    /** Its name in the world file. */
     public final String name;
 
     final Simulation sim;
@@ -125,7 +125,7 @@ public final class Robot {
         return (Device<Odometry>) first("odometry_t", "odometry");
     }
 
-    /** What the odometry makes of the wheels' speeds, also sideways. */
+    /** The velocity that the odometry computes from the wheels, also sideways. */
     @SuppressWarnings("unchecked")
     public Stream<OdometryTwist> odometryTwist() {
         return (Stream<OdometryTwist>) firstStream("odometry_twist_t", "velocity of odometry");
@@ -210,7 +210,7 @@ public final class Robot {
         return (Device<Contact>) first("contact_t", "contact sensor");
     }
 
-    /** What it runs into, and what blocks it; it needs no bumper. */
+    /** The bodies that it runs into, and the one that blocks it; it needs no bumper. */
     @SuppressWarnings("unchecked")
     public Stream<Collisions> collisions() {
         return (Stream<Collisions>) firstStream("collisions_t", "collisions");
@@ -241,7 +241,7 @@ public final class Robot {
         return (Stream<Pose>) firstStream("pose_t", "true pose");
     }
 
-    /** What it is executing. */
+    /** The status of its motion. */
     @SuppressWarnings("unchecked")
     public Stream<MotionStatus> motion() {
         return (Stream<MotionStatus>) firstStream("motion_status_t", "motion status");
@@ -279,10 +279,10 @@ public final class Robot {
     }
 
     /**
-     * Commands joints by their names. Each holds what it was commanded until its next command; no
-     * watchdog ends that. values: rad or m, rad/s or m/s, N m or N; positions are kept within the
-     * joint's limits. Throws UnknownName, which lists the joints, NotSupported for a joint that
-     * takes no commands, and in lockstep.
+     * Commands joints by their names. Each holds its command until the next one; no watchdog ends
+     * it. values: rad or m, rad/s or m/s, N m or N; positions are kept within the joint's limits.
+     * Throws UnknownName, which lists the joints, NotSupported for a joint that takes no commands,
+     * and in lockstep.
      */
     public void commandJoints(Map<String, Double> values, JointMode mode) {
         sim.checkOpen();
@@ -291,7 +291,9 @@ public final class Robot {
         sim.bus.publish(command.channel, command.data);
     }
 
-    /** What {@link #commandJoints} sends, for {@link Simulation#step(long, List)}. */
+    /**
+     * A joint command for {@link Simulation#step(long, List)}, as {@link #commandJoints} sends it.
+     */
     public Command jointCommand(Map<String, Double> values, JointMode mode) {
         String channel = input("joint_command_t", "it has no joints");
         JointLimits limits = sim.limitsOf(name);
@@ -323,8 +325,8 @@ public final class Robot {
      * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
      * command of any kind: this program repeats it in the background, so that the watchdog does not
      * stop the robot. It lapses watchdog() s of sim time after the program has ended or was
-     * stopped; {@link #driving} shows in the program how long that is to last. Throws NotSupported
-     * for a robot without a drive, and in lockstep, as all that drives at once.
+     * stopped; {@link #driving} limits it to a block of the program. Throws NotSupported for a
+     * robot without a drive, and in lockstep, as all that drives at once.
      */
     public void setVelocity(double v, double omega) {
         setVelocity(v, omega, 0.0);
@@ -332,7 +334,7 @@ public final class Robot {
 
     /**
      * The same with vy, m/s to the left, of a robot that moves sideways. Throws NotSupported for
-     * another.
+     * other robots.
      */
     public void setVelocity(double v, double omega, double vy) {
         Command command = velocityCommand(v, omega, vy);
@@ -372,7 +374,10 @@ public final class Robot {
         driver("wheelCommand(left, right)").keepSending(command.channel, command.data);
     }
 
-    /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */
+    /**
+     * A velocity command for {@link Simulation#step(long, List)}, as {@link #setVelocity} sends it,
+     * once.
+     */
     public Command velocityCommand(double v, double omega) {
         return velocityCommand(v, omega, 0.0);
     }
@@ -398,7 +403,10 @@ public final class Robot {
         return new Command(channel, Bus.encode(command));
     }
 
-    /** What {@link #setWheels} sends, once, for {@link Simulation#step(long, List)}. */
+    /**
+     * A wheel command for {@link Simulation#step(long, List)}, as {@link #setWheels} sends it,
+     * once.
+     */
     public Command wheelCommand(double left, double right) {
         wheel_command_t command = new wheel_command_t();
         command.utime = sim.clock.utime();
@@ -429,8 +437,8 @@ public final class Robot {
     }
 
     /**
-     * Comes to rest. Like all primitives it returns at once; await() on what it returns waits for
-     * the end.
+     * Comes to rest. Like all primitives it returns at once; await() of the result waits for the
+     * end.
      */
     public Motion stop() {
         return move("stop", move_command_t.STOP, 0.0, 0.0, Limits.NONE);
@@ -558,8 +566,8 @@ public final class Robot {
     }
 
     /**
-     * The messages of a device or channel, by its name ("temp"), of a plugin's, too. What step()
-     * returns takes the stream, too. Throws UnknownName.
+     * The messages of a device or channel, by its name ("temp"), of a plugin's, too. The
+     * observations of step() accept the stream, too. Throws UnknownName.
      *
      * @param type the class that lcm-gen made of its .lcm file
      * @param <M> that class

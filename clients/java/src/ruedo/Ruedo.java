@@ -35,22 +35,22 @@ public final class Ruedo {
         return connect(url, "client-" + ProcessHandle.current().pid(), 2.0);
     }
 
-    /** The same with a name of this client, and the seconds of real time to wait for a server. */
+    /** The same with a name of this client, and a timeout to wait for a server, s of real time. */
     public static Simulation connect(String url, String name, double timeout) {
         return new Simulation(Address.resolve(url), name, timeout, null);
     }
 
     /**
-     * What a run recorded (`ruedo run --record`), or any other log of LCM's. Throws RuedoException
-     * for what cannot be read, and what is no log.
+     * Opens the log of a run (`ruedo run --record`), or any other log of LCM. Throws RuedoException
+     * if the file cannot be read, or is not a log.
      */
     public static Log readLog(String path) {
         return new Log(path);
     }
 
     /**
-     * Reads what `ruedo map`, {@link OccupancyMap#save} and map_server of ROS write: NAME.yaml, and
-     * the PGM that it names. Throws RuedoException, which names the file and what is wrong with it.
+     * Reads a map of `ruedo map`, {@link OccupancyMap#save} or map_server of ROS: NAME.yaml, and
+     * its PGM. Throws RuedoException, which names the file and its fault.
      */
     public static OccupancyMap loadMap(String path) {
         return MapFile.load(Path.of(path));
@@ -64,7 +64,7 @@ public final class Ruedo {
     /**
      * Starts `ruedo run WORLD` (found by RUEDO, the PATH, or above this jar) and joins it. The
      * server ends with the Simulation, and with this process however that ends. Throws LaunchError
-     * with what the server said.
+     * with the server's message.
      */
     public static Simulation launch(String world, LaunchOptions options) {
         ServerProcess server = new ServerProcess(world, options);

@@ -1,7 +1,7 @@
 package ruedo;
 
 /**
- * What can go wrong, in words that say what to do next. Bad arguments are
+ * The errors of this library, whose messages say what to do. Bad arguments are
  * IllegalArgumentExceptions.
  */
 public class RuedoException extends RuntimeException {
@@ -15,7 +15,9 @@ public class RuedoException extends RuntimeException {
         super(text, cause);
     }
 
-    /** What a callback threw, which is the cause; thrown by the next call of its simulation. */
+    /**
+     * An exception of a callback, which is the cause; the next call of its simulation throws it.
+     */
     public static final class CallbackException extends RuedoException {
         private static final long serialVersionUID = 1L;
 
@@ -60,7 +62,7 @@ public class RuedoException extends RuntimeException {
         }
     }
 
-    /** Nothing came within the time given. */
+    /** No message or reply came within the timeout. */
     public static final class Timeout extends RuedoException {
         private static final long serialVersionUID = 1L;
 
@@ -91,7 +93,7 @@ public class RuedoException extends RuntimeException {
     public static final class MotionError extends RuedoException {
         private static final long serialVersionUID = 1L;
 
-        /** Why, as in {@link MotionStatus#reason}. */
+        /** The reason, as in {@link MotionStatus#reason}. */
         public final String reason;
 
         MotionError(String text, String reason) {
@@ -104,7 +106,7 @@ public class RuedoException extends RuntimeException {
     public static class RequestError extends RuedoException {
         private static final long serialVersionUID = 1L;
 
-        /** Of reply_t. */
+        /** The code of reply_t. */
         public final int code;
 
         RequestError(String text, int code) {
@@ -114,7 +116,7 @@ public class RuedoException extends RuntimeException {
     }
 
     /**
-     * Lockstep goes on without this client, which was silent for too long; the next step() takes
+     * Lockstep continues without this client, which was silent for too long; the next step() takes
      * part again.
      */
     public static final class LeaseLost extends RequestError {

@@ -1,6 +1,6 @@
 package ruedo;
 
-/** What a device delivers. SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. */
+/** A measurement of a device. SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. */
 public abstract class Sample {
     /** us, sim time of the state shown. */
     public final long utime;

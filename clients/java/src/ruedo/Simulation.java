@@ -44,7 +44,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         if ("1".equals(System.getenv("RUEDO_REGRESS"))) ProgramEnd.comesWithTheRun();
     }
 
-    /** Where it is. */
+    /** Its address. */
     public final String url;
 
     final Bus bus;
@@ -135,7 +135,7 @@ public final class Simulation extends Requests implements AutoCloseable {
 
     // Description.
 
-    /** Of the server. */
+    /** The server's version. */
     public String version() {
         return info().head.version;
     }
@@ -145,7 +145,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return info().head.world;
     }
 
-    /** Of the random numbers. */
+    /** The seed of the random numbers. */
     public long seed() {
         return info().head.seed;
     }
@@ -160,7 +160,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return clock.utime() * 1e-6;
     }
 
-    /** As ruedo/info last said it. */
+    /** Whether the run is paused, by the latest ruedo/info. */
     public boolean paused() {
         return info().head.paused;
     }
@@ -172,7 +172,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return all;
     }
 
-    /** All bodies that there are. */
+    /** All bodies. */
     public List<Body> bodies() {
         List<Body> all = new ArrayList<>();
         for (Body one : info().bodies) all.add(new Body(this, one.name, one.isStatic, one.mass));
@@ -180,8 +180,8 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * A model ("crate"), or a part of it ("crate/lid"): its pose, its twist, and putting it
-     * elsewhere. Throws UnknownName, which lists the models.
+     * A model ("crate"), or a part of it ("crate/lid"): reads and sets its pose and twist. Throws
+     * UnknownName, which lists the models.
      */
     public Body body(String name) {
         boolean found = false, isStatic = true;
@@ -229,8 +229,8 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Waits until so many seconds of sim time have passed. Prints a warning where that stands still
-     * for 5 s of real time, with the reason.
+     * Waits until so many seconds of sim time have passed. Prints a warning if sim time stands
+     * still for 5 s of real time, with the reason.
      *
      * @throws RuedoException.RunEnded when the run has
      */
@@ -246,9 +246,9 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * A loop at a period of sim time (s): for (double t : sim.every(0.1)) goes on at each multiple
-     * of it, with the time (s) of that moment, and leaves out those that have passed while the
-     * loop's body ran. Ends with the run.
+     * A loop at a period of sim time (s): for (double t : sim.every(0.1)) iterates at each multiple
+     * of it, with its time (s), and skips those that have passed while the loop's body ran. Ends
+     * with the run.
      */
     public Iterable<Double> every(double period) {
         long micros = Double.isFinite(period) ? Math.round(period * 1e6) : 0;
@@ -275,9 +275,9 @@ public final class Simulation extends Requests implements AutoCloseable {
 
     /**
      * Streams joined by stamp: for (var both : sim.synchronised(robot.lrf(), robot.pose())) has in
-     * both.first each sample of the first stream, and in both.second what {@link Stream#at} of the
-     * second gives for its time; both.get(stream) has that of any of them. A loop slower than the
-     * first stream gets its newest sample each time, or the oldest of its {@link
+     * both.first each sample of the first stream, and in both.second the result of {@link
+     * Stream#at} of the second for its time; both.get(stream) has that of any of them. A loop
+     * slower than the first stream gets its newest sample each time, or the oldest of its {@link
      * Stream#queueDepth()}. Ends with the run.
      */
     public <A extends Sample, B extends Sample> Iterable<Synchronised<A, B>> synchronised(
@@ -325,7 +325,7 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Takes n steps and returns what was seen; timeout: the longest pause without progress, s of
+     * Takes n steps and returns the observations; timeout: the longest pause without progress, s of
      * real time. In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants
      * n steps with their commands, and has every message of every step; the first call's
      * observations begin with those of the state it found. n = 0 takes no step. Throws LeaseLost.
@@ -354,7 +354,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return info().supports(request_t.GRANT);
     }
 
-    /** What a reset resets. */
+    /** The parts that a reset resets. */
     public enum Reset {
         /** What follows equals a fresh run. */
         ALL,
@@ -369,7 +369,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         reset(Reset.ALL, -1);
     }
 
-    /** Resets everything. seed: of what follows, -1: the same again. */
+    /** Resets everything. seed: of the new run; -1: the same as before. */
     public void reset(Reset what, long seed) {
         reset_request_t body = new reset_request_t();
         body.what =
@@ -393,9 +393,9 @@ public final class Simulation extends Requests implements AutoCloseable {
 
     /**
      * Adds a model. model: a name, or "" for SDF or URDF in text. name: "" is the model's own.
-     * position: m; orientation: w, x, y, z. onGround: it stands on the ground below. The server
-     * refuses to put it into something. Returns the model's name: the server numbers one that is
-     * taken, unless it was asked for.
+     * position: m; orientation: w, x, y, z. onGround: places it on the ground below. The server
+     * refuses a place inside of another model. Returns the model's name: the server numbers a name
+     * that exists, unless it was given.
      */
     public String spawn(
             String model,
@@ -425,12 +425,12 @@ public final class Simulation extends Requests implements AutoCloseable {
         refreshInfo(before);
     }
 
-    /** Puts a model at x, y, z (m) with a heading (rad), at rest. */
+    /** Sets a model's place x, y, z (m) and heading (rad), at rest. */
     public void setPose(String name, double x, double y, double heading, double z) {
         setPose(name, new double[] {x, y, z}, aboutZ(heading));
     }
 
-    /** Puts a model somewhere, at rest. position: m; orientation: w, x, y, z. */
+    /** Sets a model's pose, at rest. position: m; orientation: w, x, y, z. */
     public void setPose(String name, double[] position, double[] orientation) {
         set_pose_request_t body = new set_pose_request_t();
         body.name = name;
@@ -440,10 +440,10 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Draws for people to see, in the web console and in the log.
+     * Draws in the world; the web console and the log show it.
      *
-     * @param layer a name of your own; what is drawn takes the place of all that was in it, and
-     *     nothing empties it
+     * @param layer a name of your own; the markers replace all earlier ones of the layer, and an
+     *     empty list clears it
      * @param frame a robot, with whose base_link it moves; "": the world
      * @throws IllegalArgumentException for more than a message holds
      */
@@ -463,8 +463,8 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Sends a message to the server and to whoever listens at {@link #url}: its bytes as LCM
-     * encodes it, on a channel such as "p3at/velocity". In lockstep commands belong to step().
+     * Sends a message to the server and to all listeners at {@link #url}: its bytes as LCM encodes
+     * it, on a channel such as "p3at/velocity". In lockstep commands belong to step().
      */
     public void publish(String channel, byte[] message) {
         checkOpen();
@@ -477,8 +477,8 @@ public final class Simulation extends Requests implements AutoCloseable {
     }
 
     /**
-     * Keeps the state under a name, in the folder that the server was started with ({@link
-     * LaunchOptions#snapshots}); restore() takes what it returns.
+     * Saves the state under a name, in the folder of {@link LaunchOptions#snapshots}; restore()
+     * takes the result.
      */
     public State save(String name) {
         State now = snapshot(name);
@@ -495,7 +495,7 @@ public final class Simulation extends Requests implements AutoCloseable {
                 now.angular);
     }
 
-    /** Puts the world back to what save() returned. */
+    /** Restores a state that save() returned. */
     public State restore(State saved) {
         return restore(saved.name);
     }

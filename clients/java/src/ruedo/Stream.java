@@ -7,8 +7,8 @@ import java.util.function.Consumer;
 
 /**
  * A stream of samples from one channel. Thread safe; the first use subscribes. It is a reader of
- * itself, the same one as every stream of the channel that the robot returns; who reads beside it
- * takes a {@link #reader()} of its own.
+ * itself, the same one as every stream of the channel that the robot returns; for an independent
+ * one take a {@link #reader()}.
  *
  * @param <T> kind of sample
  */
@@ -32,7 +32,7 @@ public class Stream<T extends Sample> extends Reader<T> {
         rate = info.rate;
     }
 
-    /** A reader that has seen nothing yet. */
+    /** A new reader, which has read no sample yet. */
     public Reader<T> reader() {
         return reader(1);
     }
@@ -50,11 +50,11 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     /**
-     * The sample of a moment (us of sim time, such as scan.utime): waits until the stream has come
-     * so far, at most timeout seconds of real time. Where no sample is of that moment, a pose or
-     * odometry is interpolated between its neighbours, and of other streams it is the nearest. A
-     * stream keeps its last 256 samples, of 4 MB at most, from its first use on: for an earlier
-     * moment Timeout is thrown; {@link Simulation#synchronised} joins streams from the beginning.
+     * The sample of a time (us of sim time, such as scan.utime): waits until the stream has reached
+     * it, at most timeout seconds of real time. If no sample is of that time, a pose or odometry is
+     * interpolated between its neighbours, and other streams return the nearest sample. A stream
+     * keeps its last 256 samples, of 4 MB at most, from its first use on: for an earlier time it
+     * throws Timeout; {@link Simulation#synchronised} joins streams from the beginning.
      */
     public T at(long utime, double timeout) {
         T found = core.at(utime, timeout);
@@ -70,8 +70,8 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     /**
-     * How many samples latest() and next() have skipped, since newer ones had come, or were lost on
-     * the way; and how many a callback did not get, which was slower than they came.
+     * The number of samples that latest() and next() have skipped, since newer ones had arrived or
+     * they were lost on the way; and of those that a callback was too slow for.
      */
     @Override
     public long dropped() {

@@ -4,9 +4,9 @@ import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.function.Consumer;
 
 /**
- * A callback that is called until close(), which try-with-resources does at its end. What it
- * throws, even an Error, is thrown by the next call of its simulation, as the cause of a {@link
- * RuedoException.CallbackException}, and affects no other callback.
+ * A callback that is called until close(), which try-with-resources does at its end. The next call
+ * of its simulation throws an exception of the callback, even an Error, as the cause of a {@link
+ * RuedoException.CallbackException}; it affects no other callback.
  */
 public final class Subscription implements AutoCloseable {
     private final Runnable callback;

@@ -9,10 +9,10 @@ import java.util.Map;
  * @param <B> kind of the second's
  */
 public final class Synchronised<A extends Sample, B extends Sample> {
-    /** Of the stream that paces the loop. */
+    /** The sample of the stream that paces the loop. */
     public final A first;
 
-    /** Of the second stream, at the first one's time. */
+    /** The sample of the second stream, at the first one's time. */
     public final B second;
 
     private final Map<StreamCore<?>, Sample> all;
@@ -23,7 +23,7 @@ public final class Synchronised<A extends Sample, B extends Sample> {
         this.all = all;
     }
 
-    /** That of any of the streams, at the first one's time: both.get(robot.imu()). */
+    /** The sample of any of the streams, at the first one's time: both.get(robot.imu()). */
     @SuppressWarnings("unchecked")
     public <T extends Sample> T get(Stream<T> stream) {
         Sample sample = all.get(stream.core);

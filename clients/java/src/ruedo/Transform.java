@@ -1,8 +1,8 @@
 package ruedo;
 
 /**
- * The pose of a frame B in a frame A: takes points of B to A. Immutable. If a is B in A and b is C
- * in B, a.compose(b) is C in A, and a.inverse() is A in B.
+ * The pose of a frame B in a frame A: transforms points of B to A. Immutable. If a is B in A and b
+ * is C in B, a.compose(b) is C in A, and a.inverse() is A in B.
  */
 public final class Transform {
     private final double[] position;
@@ -17,14 +17,14 @@ public final class Transform {
         this.orientation = orientation.clone();
     }
 
-    /** On the ground: m, m, and rad, counter-clockwise from the x axis. */
+    /** A transform on the ground from m, m and rad, counter-clockwise from the x axis. */
     public static Transform of(double x, double y, double heading) {
         return new Transform(
                 new double[] {x, y, 0.0},
                 new double[] {Math.cos(heading / 2.0), 0.0, 0.0, Math.sin(heading / 2.0)});
     }
 
-    /** An angle (rad) as the equal one in [-pi, pi). */
+    /** The equal angle in [-pi, pi), rad. */
     public static double normalizeAngle(double angle) {
         double turned = (angle + Math.PI) % (2.0 * Math.PI);
         return (turned < 0.0 ? turned + 2.0 * Math.PI : turned) - Math.PI;
@@ -82,7 +82,7 @@ public final class Transform {
                 });
     }
 
-    /** A point of B (m), in A. */
+    /** Transforms a point of B (m) to A. */
     public double[] apply(double... point) {
         double[] turned =
                 rotated(

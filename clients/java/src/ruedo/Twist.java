@@ -1,6 +1,6 @@
 package ruedo;
 
-/** How something moves, in the world. */
+/** A velocity, linear and angular, in the world. */
 public final class Twist {
     /** x, y, z, m/s. */
     public final double[] linear;
