@@ -46,8 +46,8 @@ namespace ruedo::client {
 
 /// A robot's drive, limits and dimensions.
 struct RobotInfo {
-  std::string name;                 ///< its own
-  std::string model;                ///< that it was made of
+  std::string name;                 ///< its name
+  std::string model;                ///< its model's name
   std::string drive;                ///< "kinematic", "wheels", "": it only senses
   double wheel_radius = 0.0;        ///< m
   double track = 0.0;               ///< m between the left and the right wheels
@@ -112,7 +112,7 @@ struct MotionCore;
 /// other callback.
 class [[nodiscard]] Subscription {
  public:
-  Subscription() = default;  ///< Of nothing.
+  Subscription() = default;  ///< Of no callback.
   /// @cond
   explicit Subscription(std::shared_ptr<CallbackCore> core) : core_(std::move(core)) {}
   Subscription(Subscription&&) noexcept = default;
@@ -242,9 +242,9 @@ class Stream {
   /// Stream continues from where the channel was last read, with its count.
   /// @return samples
   int64_t dropped() const;
-  /// How many samples wait for next() and loops, from 1 (the newest alone, from which a channel
-  /// starts) to 1000. With more, next() returns the oldest that waits; where more than that came
-  /// meanwhile, the oldest go, and dropped() counts them.
+  /// The number of samples kept for next() and loops, from 1 (only the newest, the default) to
+  /// 1000. With more, next() returns the oldest kept one; if more arrive, the oldest are dropped,
+  /// and dropped() counts them.
   /// @return samples
   int64_t queue_depth() const { return depth_; }
   /// Also of streams of this channel that are made from now on.
@@ -740,7 +740,7 @@ class Robot {
 
   /// @name Primitives
   /// Each returns at once; Motion::wait() waits for the end. They throw std::invalid_argument for
-  /// what is not finite or out of range, NotSupported for a robot without a drive and in lockstep,
+  /// values not finite or out of range, NotSupported for a robot without a drive and in lockstep,
   /// and NoServer.
   /// @{
 
@@ -801,7 +801,7 @@ class Robot {
   std::string name_;
 };
 
-/// How spawn() places a model.
+/// Options of spawn().
 struct SpawnOptions {
   double heading = 0.0;   ///< rad
   std::string name = {};  ///< "": the model's own
@@ -812,12 +812,12 @@ struct SpawnOptions {
 
 /// The parts that Simulation::reset() resets.
 enum class Reset {
-  all,   ///< what follows equals a fresh run
+  all,   ///< the run continues as a fresh one
   time,  ///< sim time starts at 0 again; nothing moves
   poses  ///< everything back to where it started, at rest; sim time goes on
 };
 
-/// How something moves, in the world.
+/// A velocity, linear and angular, in the world.
 struct Twist {
   Vector3 linear{};   ///< m/s
   Vector3 angular{};  ///< rad/s
@@ -956,10 +956,10 @@ class [[nodiscard]] Simulation : public Requests {
   /// @param z m, world
   void set_pose(const std::string& name, double x, double y, double heading = 0.0,
                 double z = 0.0) const;
-  /// As an Engine's: keeps the state, in the folder that the server was started with
+  /// Saves the state as an Engine does, in the server's folder for snapshots
   /// (LaunchOptions::snapshots).
   /// @param name of the snapshot
-  /// @return what restore() takes
+  /// @return for restore()
   [[nodiscard]] State save(const std::string& name = "saved") const {
     State saved = snapshot(name);
     saved.name = name;
@@ -967,7 +967,7 @@ class [[nodiscard]] Simulation : public Requests {
   }
   /// @copydoc Requests::restore
   State restore(const std::string& name) const;
-  /// The same with what save() returned.
+  /// Restores a state that save() returned.
   /// @param saved by save()
   /// @return the state as it is then
   State restore(const State& saved) const { return restore(saved.name); }
@@ -1006,7 +1006,7 @@ class [[nodiscard]] Simulation : public Requests {
   void close();
 };
 
-/// How connect() joins.
+/// Options of connect().
 struct ConnectOptions {
   std::string name;        ///< of this client; "": "client-PID"
   Duration timeout = 2.0;  ///< of real time to wait for a server
@@ -1027,7 +1027,7 @@ namespace detail {
 std::string program_beside(const std::string& header);
 }  // namespace detail
 
-/// How launch() starts the server; the lists are as the options of `ruedo run`.
+/// Options of launch(); the lists are as the options of `ruedo run`.
 struct LaunchOptions {
 #ifdef RUEDO_PROGRAM  // find_package(ruedo) defines it
   std::string program = RUEDO_PROGRAM;
@@ -1037,17 +1037,17 @@ struct LaunchOptions {
 #endif
   int64_t seed = -1;                        ///< -1: the server's default
   double rate = 1.0;                        ///< sim time per real time; kFast: as fast as it goes
-  int lockstep = 0;                         ///< how many clients the run waits for
+  int lockstep = 0;                         ///< number of clients that the run waits for
   std::vector<std::string> spawn;           ///< models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
   std::vector<std::string> disable;         ///< devices that are left out: "p3at/camera"
   std::map<std::string, Setting> settings;  ///< {{"p3at/lrf.update_rate", 20}}
   bool noise = true;                        ///< false: ideal values
   Duration duration = kForever;             ///< of sim time, after which the run ends
-  bool paused = false;                      ///< it starts so, at step 0
+  bool paused = false;                      ///< starts the run paused, at step 0
   std::string record;                       ///< file of a log; "": none
   std::string snapshots;                    ///< folder for snapshot() and restore(); "": none
   std::vector<std::string> drive;           ///< by wheel joints: "rover=left_joint,right_joint"
-  std::vector<std::string> fault;           ///< what goes wrong: "p3at/lrf:freeze@3"
+  std::vector<std::string> fault;           ///< faults: "p3at/lrf:freeze@3"
   std::vector<std::string> plugin;          ///< shared libraries with sensors or drives
   std::vector<std::string> wait_for;        ///< where a command is due: "p3at/velocity@10"
   std::string text;               ///< the world's SDF or URDF itself, where the world is ""

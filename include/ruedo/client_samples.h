@@ -16,11 +16,11 @@ namespace ruedo::client {
 
 // ---- Errors. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
 
-/// Whatever else can go wrong; the text says what.
+/// Any other failure; the text says which.
 struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
-/// None answered, it fell silent or ended, or the Simulation was closed.
+/// No server answered, it fell silent or ended, or the Simulation was closed.
 struct NoServer : Error {
   using Error::Error;
 };
@@ -36,7 +36,7 @@ struct LaunchError : Error {
 struct UnknownName : Error {
   using Error::Error;
 };
-/// Nothing came within the time that was given.
+/// No message or reply came within the timeout.
 struct Timeout : Error {
   using Error::Error;
 };
@@ -53,14 +53,14 @@ struct MotionError : Error {
   /// @cond
   MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
   /// @endcond
-  MotionReason reason;  ///< why
+  MotionReason reason;  ///< of its end
 };
 /// The server refused a request.
 struct RequestError : Error {
   /// @cond
   RequestError(const std::string& text, ReplyCode reply_code) : Error(text), code(reply_code) {}
   /// @endcond
-  ReplyCode code;  ///< why
+  ReplyCode code;  ///< of the refusal
 };
 /// Lockstep continues without this client, which was silent too long; the next step() takes part
 /// again.

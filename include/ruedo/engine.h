@@ -47,8 +47,8 @@ struct EngineOptions {
 
 /// A sensor of a robot.
 struct EngineDevice {
-  std::string robot;  ///< whose it is
-  std::string name;   ///< as the world file has it
+  std::string robot;  ///< its robot
+  std::string name;   ///< its name in the world file
   std::string kind;   ///< "lrf", "odometry", ...
 };
 

@@ -44,7 +44,7 @@ std::string described(const Allowed& allowed, const char* what) {
   return text;
 }
 
-// One element's text and how it is called in messages: the path from the element that was asked.
+// One element's text and its name in messages: the path from the element that the caller reads.
 struct Value {
   const Element& element;
   std::string_view asked, child = {};  // names

@@ -1,5 +1,5 @@
-// Which elements and attributes of a document were asked for: how a test holds the readers against
-// the format's own list of them.
+// Records the elements and attributes of a document that readers read: a test compares them with
+// the format's own list.
 #pragma once
 
 #include <set>

@@ -1,4 +1,4 @@
-// Findings: what a loader noticed and went on from, each told once for each place.
+// Findings: faults that a loader noticed without stopping, each reported once for each place.
 #include "ruedo/errors.h"
 
 #include <utility>

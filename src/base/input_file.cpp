@@ -67,7 +67,7 @@ std::string read_input(const std::string& path, size_t max_bytes) {
   return text;
 }
 
-// Absolute: who calls may change the folder. Not the numbers of inodes: of a file that is removed
+// Absolute: the caller may change the folder. Not the numbers of inodes: of a file that is removed
 // another one may get them.
 void note_read(const std::string& path) {
   std::error_code error;

@@ -16,11 +16,11 @@ namespace ruedo {
   throw InputError({}, option + " '" + text + "': " + allowed);
 }
 
-// Whether that is no file but an option, which stands there for what it has set: "--set
+// Whether this is an option instead of a file, as the source of its setting: "--set
 // p3at/lrf.update_rate".
 inline bool is_option(const Source& source) { return source.file.starts_with("--"); }
 
-// False for what is no finite number, or has anything after it.
+// False unless the text is one finite number, and nothing else.
 inline bool read_number(std::string_view text, double& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);

@@ -19,7 +19,7 @@ Board& board() {
   return one;
 }
 
-// Changes what runs, and tells the watcher, who may ask for it again.
+// Changes the running task, and notifies the watcher, which may read it again.
 template <class Change>
 void tell(Change change) {
   std::function<void()> watcher;

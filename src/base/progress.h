@@ -1,4 +1,4 @@
-// How far something long has come, for who watches it: a terminal's line
+// The progress of a long task, for a watcher: a terminal's line
 // (src/cli/support/progress_line.h). Without a reader it costs a store.
 #pragma once
 
@@ -30,7 +30,7 @@ class Progress {
   };
   // Of what began last and is not over yet, in whichever thread.
   static std::optional<State> latest();
-  // Called when one begins or is over, before the program goes on; one watcher at a time, {} for
+  // Called when a task begins or ends, before the program continues; one watcher at a time, {} for
   // none.
   static void watch(std::function<void()> watcher);
 

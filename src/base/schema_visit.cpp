@@ -11,7 +11,7 @@
 namespace ruedo {
 namespace {
 
-// What is always there of a value: of a string its length, which the text follows.
+// The smallest size of a value: of a string its length, which the text follows.
 size_t fixed_size(Primitive primitive) {
   return primitive == Primitive::string ? 4 : wire_size(primitive);
 }

@@ -19,8 +19,8 @@ constexpr int kMostTypeDepth = 16;
 constexpr size_t kMostTypeDimensions = 16;
 constexpr size_t kMostTypeFields = 10'000;
 
-// A message of more fields than that, the empty arrays of structs in arrays for the most part, is
-// none of its type.
+// A message with more fields than that, mostly empty arrays of structs in arrays, does not decode
+// as its type.
 constexpr size_t kMostFieldsOfByte = 16;
 
 // Reads .lcm files, and those of folders; find_schema(fingerprint) finds their types from then on.

@@ -7,7 +7,7 @@
 
 namespace ruedo {
 
-// What is not UTF-8 becomes '?'.
+// Bytes that are not UTF-8 become '?'.
 std::string printable(std::string_view text);
 
 // And so do control characters, but for line ends and tabs: nothing in a name moves a cursor, sets
@@ -20,7 +20,7 @@ std::string in_one_line(std::string text);
 // At most so many bytes of it, without half a character at the end, and "..." for the rest.
 std::string shortened(std::string_view text, size_t longest);
 
-// Bytes of what is said, in a log or an answer, in the words of others: they may be megabytes.
+// Largest size of a foreign text that a log or a reply quotes: it may have megabytes.
 inline constexpr size_t kLongestSaid = 1000;
 
 // Whether it is UTF-8 without any control character, as a name should be.

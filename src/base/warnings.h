@@ -1,4 +1,4 @@
-// What this program has warned of so far, for viewers beside its terminal.
+// The warnings of this program, for viewers beside its terminal.
 #pragma once
 
 #include <cstddef>

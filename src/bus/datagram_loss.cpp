@@ -78,7 +78,7 @@ DatagramLossWatch::DatagramLossWatch(uint16_t port, int own_socket) : port_(port
   look();
 }
 
-// A socket's own count alone would tell of what it filters, the machine's alone of other ports.
+// A socket's own count would include datagrams that it filters, the machine's those of other ports.
 int64_t DatagramLossWatch::look() {
   const auto now = datagram_loss(port_, own_inode_);
   int64_t lost = 0;

@@ -19,10 +19,10 @@ struct DatagramLoss {
 DatagramLoss datagram_loss(const std::string& snmp, const std::string& udp, uint16_t port,
                            uint64_t own_inode = 0);
 
-// As the system counts now; empty where it does not tell.
+// The system's current counts; empty if it has none.
 std::optional<DatagramLoss> datagram_loss(uint16_t port, uint64_t own_inode = 0);
 
-// What is new from one look to the next.
+// Losses since the last call.
 class DatagramLossWatch {
  public:
   // own_socket: its losses are not counted; it may filter. The first look comes at once.
@@ -37,7 +37,7 @@ class DatagramLossWatch {
   std::optional<DatagramLoss> last_;
 };
 
-// What is to be done, in words.
+// The advice for the user.
 std::string cure_of_datagram_loss();
 
 }  // namespace ruedo::bus

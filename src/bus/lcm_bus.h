@@ -43,7 +43,7 @@ class LcmBus : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
-  // For who only publishes: a server's end is noticed, and it is looked for, as while listening.
+  // For a program that only publishes: notices a server's end and reconnects, as while listening.
   void keep_connected();
   void stop() override;
   // With memq there is only this process.
@@ -75,7 +75,7 @@ class LcmBus : public Bus {
   std::unique_ptr<MulticastReceiver> multicast_;
   std::shared_ptr<StreamConnection> stream_;  // with tcpq and unix; under connecting_
   mutable std::mutex connecting_;
-  std::optional<DatagramLossWatch> loss_;  // with multicast: of those who listen to us
+  std::optional<DatagramLossWatch> loss_;  // with multicast: of our listeners
   std::chrono::steady_clock::time_point next_look_, next_warning_;
   int64_t lost_ = 0, told_lost_ = 0;     // datagrams
   size_t receive_buffer_;                // of clients with this address
@@ -91,7 +91,7 @@ class LcmBus : public Bus {
   std::vector<std::string> wanted_;  // channels
   std::thread thread_;
   std::atomic<uint64_t> failed_{0};
-  std::atomic<bool> cut_off_{false};  // there is no network to send on
+  std::atomic<bool> cut_off_{false};  // without a network to send on
 };
 
 // Regular expressions that match the names: digits become runs of digits, so that a thousand robots

@@ -46,7 +46,7 @@ std::string resolved(const std::string& host) {
   return text;
 }
 
-// `given` names the text and who gave it.
+// `given`: the text and its source, for errors.
 [[noreturn]] void refuse(const std::string& given, const std::string& why) {
   throw InputError({}, given + ": " + why + "; an address looks like " + kDefaultUrl +
                            ", tcpq://127.0.0.1:7700 or unix:///tmp/ruedo.sock");

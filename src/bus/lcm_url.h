@@ -11,7 +11,7 @@ inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 inline constexpr uint16_t kDefaultTcpPort = 7700;  // LCM's
 
 struct LcmUrl {
-  std::string scheme;  // "udpm", "memq", "tcpq"; "unix", which is no address of LCM's
+  std::string scheme;  // "udpm", "memq", "tcpq"; "unix", which LCM does not have
   std::string host;    // udpm: the multicast group; tcpq: an IPv4 address; unix: the socket's path
   uint16_t port = 0;
   std::string options;  // "ttl=0&recv_buf_size=2097152"
@@ -24,7 +24,7 @@ struct LcmUrl {
 
 // Reads an address; "" is $LCM_DEFAULT_URL, or kDefaultUrl. A udpm address without a ttl gets ttl
 // 0, so that nothing leaves the machine by default; a tcpq address without host and port gets
-// LCM's, 127.0.0.1:7700. Throws InputError for anything else, which names who gave the text.
+// LCM's, 127.0.0.1:7700. Throws InputError for anything else, with the source of the text.
 LcmUrl parse_url(const std::string& text, const std::string& given_by = "--lcm");
 
 // True when this machine has a way to a udpm address's group. Takes microseconds, as the next.

@@ -1,5 +1,5 @@
-// The newest messages, in one block of memory: each reader has a place of its own in it, and who
-// falls a whole ring behind has lost what was overwritten. So a slow reader costs no memory.
+// The newest messages, in one block of memory: each reader has a place of its own in it, and one
+// that falls a whole ring behind loses the overwritten messages. So a slow reader costs no memory.
 //
 // Not thread safe.
 #pragma once

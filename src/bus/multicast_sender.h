@@ -17,7 +17,7 @@ class MulticastSender {
   // no route leads to the group.
   MulticastSender(const std::string& group, uint16_t port, int ttl);
 
-  // From any thread. What the system does not take is lost, as LCM's own messages are.
+  // From any thread. Datagrams that the system refuses are lost, as LCM's own messages are.
   void send(const std::string& channel, const uint8_t* bytes, size_t size);
 
  private:

@@ -13,7 +13,7 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr size_t kMostRivals = 8;  // are named
+constexpr size_t kMostRivals = 8;  // are reported
 
 std::vector<std::string> with_info(std::vector<std::string> channels) {
   channels.push_back(kInfoChannel);
@@ -56,7 +56,7 @@ void RivalWatch::listen_to(const std::vector<std::string>& channels,
 }
 
 void RivalWatch::heard(const uint8_t* data, size_t size) {
-  if (run_id_ == 0) return;  // the rival says it again when there is our own to tell
+  if (run_id_ == 0) return;  // the rival repeats it when our own id is known
   const int64_t id = run_id_of(data, size);
   if (id == run_id_ || rivals_.size() >= kMostRivals ||
       std::find(rivals_.begin(), rivals_.end(), id) != rivals_.end())

@@ -2,7 +2,7 @@
 // confuse every client.
 //
 // Servers of one host are kept apart by their claims (url_claim.h); this is for those of other
-// hosts, and for what else sends ruedo/info. Each rival is named once.
+// hosts, and for other senders of ruedo/info. Each rival is reported once.
 #pragma once
 
 #include <atomic>

@@ -107,7 +107,7 @@ ServerBus unwatched_bus(const std::string& text, const std::string& world) {
 ServerBus open_server_bus(const std::string& text, const std::string& world,
                           std::function<void(const std::string&)> say) {
   ServerBus made = unwatched_bus(text, world);
-  if (made.url.scheme != "memq")  // there nobody else can be
+  if (made.url.scheme != "memq")  // which no other process can share
     made.bus = std::make_unique<RivalWatch>(std::move(made.bus), std::move(say));
   return made;
 }

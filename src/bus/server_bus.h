@@ -33,7 +33,7 @@ struct ServerBus {
 ServerBus open_server_bus(const std::string& text, const std::string& world,
                           std::function<void(const std::string&)> say);
 
-// What a shell needs to send clients there.
+// The shell's command that sends clients there.
 std::string export_line(const LcmUrl& url);  // export LCM_DEFAULT_URL='...'
 
 }  // namespace ruedo::bus

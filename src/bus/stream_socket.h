@@ -7,11 +7,11 @@
 
 namespace ruedo::bus {
 
-// A stream socket whose connect() and send() give up after some seconds: a server that takes
-// nothing holds nobody up for longer.
+// A stream socket whose connect() and send() give up after some seconds: a server that reads
+// nothing blocks no caller for longer.
 FileHandle stream_socket(int family);
 
-// Connects to a TCP server; empty when nobody answers, and `why` says what is wrong.
+// Connects to a TCP server; empty if none answers, with the reason in `why`.
 FileHandle connect_tcp(const std::string& host, const std::string& port, std::string& why);
 
 }  // namespace ruedo::bus

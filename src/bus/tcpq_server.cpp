@@ -129,7 +129,7 @@ void TcpqServer::serve() {
   epoll_event events[64];
   for (;;) {
     const bool stopping =
-        stop_;  // read before collect(): all that was published before stop() is taken over
+        stop_;  // read before collect(), which gets all messages published before stop()
     const int count = ::epoll_wait(poll_.get(), events, 64, stopping ? 10 : 500);
     bool newcomers = false;  // after the others: making place for them ends old ones
     for (int i = 0; i < count; ++i) {
@@ -209,8 +209,8 @@ void TcpqServer::look_again_soon() {
   ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
 }
 
-// All places are taken: ends the oldest connection without a greeting, else the oldest with nothing
-// but a greeting, else one of the peer with the most. False when that peer is the newcomer's own.
+// When all places are occupied, ends the oldest connection without a greeting, else the oldest with
+// only a greeting, else one of the peer with the most. False if that peer is the newcomer's own.
 bool TcpqServer::make_place(const FileHandle& newcomer) {
   for (const bool greeted : {false, true}) {
     for (Client& client : clients_) {
@@ -440,7 +440,7 @@ void TcpqServer::send(Client& client) {
     size_t sent = result < 0 ? 0 : static_cast<size_t>(result);
     if (sent > 0) client.moved = Clock::now();
     if (sent == total) continue;
-    // What is left of a message that was begun goes to the client's own buffer: the ring may turn.
+    // The rest of a partly sent message goes to the client's own buffer: the ring may overwrite it.
     int begun = 0;
     for (; sent >= pieces[begun].iov_len; ++begun) sent -= pieces[begun].iov_len;
     client.place = places[begun];

@@ -3,11 +3,11 @@
 // One thread does all the network. publish() copies a message into a bounded queue and returns; the
 // thread moves it to a ring from which each client is served at its own pace. Of conflated channels
 // a client that is kMostOld behind gets the newest message; one that falls a ring behind loses
-// messages. What clients publish goes to the simulation and to all clients that
-// subscribed to it, as on any LCM bus.
+// messages. Messages of clients go to the simulation and to all subscribed clients, as on any LCM
+// bus.
 //
-// When all places are taken, a newcomer replaces a connection that has said nothing. If there is
-// none, it replaces one of the process (on another machine: the address) with the most connections,
+// When all places are occupied, a newcomer replaces a connection that has sent nothing. Without
+// one, it replaces one of the process (on another machine: the address) with the most connections,
 // provided that this has more than the newcomer's own would then have.
 #pragma once
 
@@ -39,8 +39,8 @@ class TcpqServer : public Bus {
   static constexpr size_t kMostReceived =
       64 << 20;  // bytes of incomplete frames, all clients together
 
-  // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError when it is
-  // taken.
+  // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError if it is in
+  // use.
   explicit TcpqServer(const LcmUrl& url);
   ~TcpqServer() override;
 
@@ -53,9 +53,9 @@ class TcpqServer : public Bus {
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
   void conflate(const std::vector<std::string>& channels) override;
-  // Which of the clients that is cannot be told: all may be further behind.
+  // The launcher may be any of the clients: all may be further behind.
   void keep_all_for_launcher() override { most_old_ = kMostOldForLauncher; }
-  // Sends what was published so far, for at most half a second, and closes all connections.
+  // Sends all published messages, for at most half a second, and closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
   uint64_t replaced() const override { return replaced_; }

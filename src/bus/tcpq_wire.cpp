@@ -134,7 +134,7 @@ void Filter::subscribe(std::string_view pattern) {
   auto& kept = read.whole ? names_ : beginnings_;
   const size_t most = read.whole ? kMostNames : kMostBeginnings;
   if (kept.size() >= most &&
-      !kept.contains(read.text)) {  // who wants so much gets everything, for good
+      !kept.contains(read.text)) {  // too many subscriptions: it gets everything from now on
     ++beginnings_[""];
     return;
   }

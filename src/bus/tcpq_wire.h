@@ -1,5 +1,5 @@
-// LCM's tcpq on the wire, the server's side: the client's stream taken apart, and which channels a
-// client asked for.
+// LCM's tcpq on the wire, the server's side: parses the client's stream, and keeps a client's
+// subscriptions.
 //
 // A client sends its magic and the version, hears the server's, and then sends frames: PUBLISH
 // (channel, data), SUBSCRIBE and UNSUBSCRIBE (a regular expression). The server sends PUBLISH
@@ -21,7 +21,7 @@ inline constexpr size_t kLongestChannel = 63;  // LCM's
 inline constexpr size_t kLongestPattern = 64 * 1024;
 inline constexpr size_t kLargestMessage = 4 * 1024 * 1024;  // from a client
 
-// What each side says first.
+// The greeting of each side.
 std::vector<uint8_t> server_hello();
 std::vector<uint8_t> client_hello();
 // Append a PUBLISH, or a SUBSCRIBE or UNSUBSCRIBE with a channel's name.
@@ -48,8 +48,8 @@ class Reader {
   }
 
   enum class Result { frame, more, broken };
-  // The next frame, valid until add() or tidy(); `more` when it has not all come; `broken` when
-  // this is no tcpq client or a length is beyond what is allowed.
+  // The next frame, valid until add() or tidy(); `more` if it is incomplete; `broken` if this is
+  // not a tcpq client or a length is not allowed.
   Result next(Frame& frame);
   // Forgets what was read.
   void tidy();

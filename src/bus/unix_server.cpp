@@ -141,8 +141,8 @@ void UnixServer::send(Client& client) {
   }
 }
 
-// Returns the index of the first frame that was not sent or kept. What lies together in memory is
-// one piece.
+// Returns the index of the first frame that was not sent or kept. Frames that are adjacent in
+// memory are one piece.
 size_t UnixServer::send_at_once(Client& client) {
   for (size_t begin = 0, end = 0; begin < index_.size(); begin = end) {
     iovec pieces[kMostPieces];
@@ -213,7 +213,7 @@ void UnixServer::keep(Client& client, std::span<const uint8_t> bytes) {
   watch(client);
 }
 
-// What is not replaced goes first, so that replies do not wait for samples.
+// Messages of channels that are not conflated go first: replies do not wait for samples.
 void UnixServer::take_out_replaced(Client& client) {
   const size_t begin = first_frame(client.rest, client.frames_begin, client.rest_sent);
   std::unordered_map<std::string, size_t> newest;  // of each conflated channel, where it begins

@@ -1,8 +1,8 @@
 // The bus as a Unix-domain socket: for programs of one user on one machine.
 //
 // The socket has mode 0600, and the kernel names its peer: no other user reads or sends.
-// The frames are tcpq's (tcpq_wire.h). What is published waits for flush(), and then goes to each
-// client in one call of the system; what a client does not take at once is kept for it, in order.
+// The frames are tcpq's (tcpq_wire.h). Messages wait for flush(), and then go to each client in
+// one call of the system; messages that a client does not read at once are kept for it, in order.
 // Once more than kMostOld bytes wait for a client, messages on conflated channels that newer ones
 // replace are taken out; the process that started this one keeps all of them, since a run does not
 // leave it behind. A client that falls kMostBehind behind loses whole messages. Both are logged.
@@ -69,7 +69,7 @@ class UnixServer : public Bus {
     std::vector<uint8_t> rest;  // what it has not taken yet
     size_t rest_sent = 0;
     size_t frames_begin = 0;  // in rest; before it is what remains of a frame that was sent in part
-    size_t most_old = kMostOld;  // then those that are replaced are taken out
+    size_t most_old = kMostOld;  // then replaced messages are removed
     bool is_launcher = false;
     bool told_replaced = false;
     bool watched = false;  // for room

@@ -78,12 +78,12 @@ FileHandle connect_unix(const std::string& path) {
 
 bool is_unix_served(const std::string& path) {
   const FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  return connect(socket, path) || errno == EAGAIN;  // which is one that accepts nobody just now
+  return connect(socket, path) || errno == EAGAIN;  // a server whose queue is full
 }
 
 FileHandle listen_unix(const std::string& path) {
   check_path(path);
-  // It gets its name when it listens: who waits for the file may connect at once.
+  // It gets its name when it listens: a program that waits for the file may connect at once.
   const std::string own = path + "~" + std::to_string(::gettid());
   clear(own);
   struct Unnamed {

@@ -1,4 +1,4 @@
-// Claims by abstract local sockets: who connects reads a line.
+// Claims by abstract local sockets: a connection reads a line.
 #include "bus/url_claim.h"
 
 #include <cerrno>
@@ -77,7 +77,7 @@ void UrlClaim::answer() {
     const FileHandle asker(
         ::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!asker) {
-      // No file descriptors: who asks waits a moment.
+      // No file descriptors: the other process waits a moment.
       if (errno != EAGAIN) ::poll(&waiting[1], 1, 100);
       continue;
     }

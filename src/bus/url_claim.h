@@ -1,4 +1,4 @@
-// Which server has an LCM address: one at a time in each network, and it tells others who it is.
+// A server's claim to an LCM address: one at a time in each network, with its description.
 //
 // The claim is a local socket with an abstract name: it belongs to the network namespace, is the
 // same for all users of the host, and vanishes with the process, however that ends.
@@ -16,8 +16,8 @@ namespace ruedo::bus {
 class UrlClaim {
  public:
   UrlClaim() = default;
-  // Claims an address; memq addresses are free for all. `owner` is one line about who has it now.
-  // Throws EnvironmentError with the line of the other, when there is one.
+  // Claims an address; memq addresses are free for all. `owner`: one line that describes this
+  // server. Throws EnvironmentError with the line of another one, if it has the claim.
   UrlClaim(const LcmUrl& url, std::string owner);
   ~UrlClaim();
   UrlClaim(const UrlClaim&) = delete;

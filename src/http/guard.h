@@ -22,7 +22,7 @@ Address parse_address(const std::string& text, const std::string& option = "--vi
 // A new token: 32 hexadecimal digits from the kernel's generator.
 std::string make_token();
 
-// What a request says about itself.
+// The headers of a request.
 struct Visit {
   std::string host{}, origin{}, cookie{},
       token{};          // headers Host, Origin and Cookie; the address's ?token=

@@ -78,7 +78,7 @@ struct WebServer::Impl {
     Bytes body;                              // of the response that is being sent; null: none
     size_t sent = 0;                         // of it
     bool ends = false;                       // the connection, with it
-    std::unique_ptr<Connection> connection;  // null: it is no WebSocket
+    std::unique_ptr<Connection> connection;  // null unless it is a WebSocket
     std::vector<uint8_t> incoming;           // what has come of its next message
     size_t held = 0;  // bytes that were made for it alone, and are not known to be sent
     Time held_since;
@@ -101,7 +101,7 @@ struct WebServer::Impl {
   Timer timer;
   std::map<lws*, Peer> peers;
   uint64_t number = 0;     // of the newest
-  Time next_look;          // at who has most
+  Time next_look;          // at the peer with most
   bool postponed = false;  // somebody's message, until there is room
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
@@ -185,7 +185,7 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
     default: return 0;
   }
   const auto found = peers.find(wsi);
-  if (found == peers.end()) return -1;  // it had to give way
+  if (found == peers.end()) return -1;  // it was closed to make room
   Peer& peer = found->second;
   peer.silent = false;
   switch (reason) {
@@ -219,7 +219,7 @@ void WebServer::Impl::welcome(lws* wsi) {
   keep_to_limits();
 }
 
-// Where there are too many, those who have most give way.
+// If there are too many, closes connections of the peers that have most.
 void WebServer::Impl::keep_to_limits() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_look) return;
@@ -242,7 +242,7 @@ size_t WebServer::Impl::held() const {
   return bytes;
 }
 
-// Who takes nothing while there is no room for others gives way.
+// Closes a connection that reads nothing while others have no room.
 void WebServer::Impl::make_room() {
   const Time latest = std::chrono::steady_clock::now() - kMostStuck;
   const auto is_stuck = [&](const Peer& peer) { return peer.held > 0 && peer.held_since < latest; };
@@ -289,7 +289,7 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
 }
 
 int WebServer::Impl::request(lws* wsi, Peer& peer, std::string_view path) {
-  // What follows a body, or what is no GET, is not read as the next request.
+  // Bytes after a body, or after another request than GET, are not read as the next request.
   peer.ends = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
               lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0 ||
               lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0;

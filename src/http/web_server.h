@@ -38,7 +38,7 @@ class Connection {
 // Whether it could be served now, before any work. Throws EnvironmentError, as WebServer.
 void check_port(const Address& address, const std::string& option);
 
-// What is served, and to whom.
+// The address, and the allowed hosts.
 struct WebPlace {
   Address address;
   std::string token;               // "": none is required
@@ -60,15 +60,15 @@ struct WebHandler {
 
 class WebServer {
  public:
-  // HTTP and WebSocket together. Where there are more, of either, those give way whose process, or
-  // machine, has most.
+  // HTTP and WebSocket together. With more of either, connections of the process, or machine, with
+  // the most are closed.
   static constexpr size_t kMostConnections = 320;
   static constexpr size_t kMostSilent =
       64;  // of those that have sent no request yet; beyond, the oldest is closed
   static constexpr size_t kMostMessage = size_t{1}
                                          << 20;  // bytes that a browser may send as one message
-  // Made for single ones and not sent yet. Where there is more, the others wait, and who takes
-  // nothing gives way.
+  // Made for single connections and not sent yet. With more, the others wait, and a connection that
+  // reads nothing is closed.
   static constexpr size_t kMostHeld = size_t{128} << 20;
   static constexpr size_t kMostHeaders = 4096;  // bytes of a request's headers
 

@@ -1,4 +1,4 @@
-// A message is checked whole by its schema before a value of it is taken: then no length lies.
+// The schema checks the whole message before its values are read: then all lengths are valid.
 #include "log/columns.h"
 
 #include <algorithm>

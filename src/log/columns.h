@@ -51,7 +51,7 @@ class Table {
   // dimension but the first varies.
   static bool fits(const Schema& schema);
 
-  // False, without a trace, for what is no whole message of the type.
+  // False, without an effect, unless the bytes are one whole message of the type.
   bool add(std::span<const uint8_t> message);
 
   const Schema& schema() const { return *schema_; }
@@ -83,7 +83,7 @@ struct Columns {
 };
 
 // Messages of types that Ruedo does not know, and of another type than the channel's first, are
-// left out. Throws InputError for what is no log.
+// left out. Throws InputError if the file is not a log.
 Columns read_columns(const std::string& path, const ColumnRequest& request);
 
 }  // namespace ruedo::log

@@ -50,8 +50,8 @@ std::vector<std::string> patterns_of(const std::set<std::string>& types) {
 
 // A scalar of a message. It points into that.
 struct Value {
-  uint64_t pattern;  // stands for FieldPath::pattern()
-  uint64_t place;    // stands for FieldPath::str()
+  uint64_t pattern;  // represents FieldPath::pattern()
+  uint64_t place;    // represents FieldPath::str()
   FieldValue value;
 };
 
@@ -99,8 +99,8 @@ class Comparison {
  public:
   Comparison(Diff& diff, const std::vector<DiffRule>& rules) : diff_(diff), rules_(rules) {}
 
-  // What two logs have at one time. may_lack, may_add: what only the golden log, or only the other
-  // has is passed over.
+  // Compares two logs at one time. may_lack, may_add: ignores messages that only the golden log, or
+  // only the other, has.
   void meet(const Events& golden, const Events& other, bool may_lack, bool may_add) {
     for (const auto& [channel, events] : golden) {
       note_types(channel, events);
@@ -183,7 +183,7 @@ class Comparison {
   bool is_judged(const std::string& channel, const std::set<std::string>& types) const {
     const std::vector<std::string> patterns = patterns_of(types);
     return !ignored(channel) &&
-           (patterns.empty() ||  // of types without a field: there are messages, or there are none
+           (patterns.empty() ||  // of types without a field: their presence counts
             std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
               const DiffRule* rule = rule_of(channel, pattern);
               return rule == nullptr || !rule->ignore;
@@ -216,7 +216,7 @@ class Comparison {
     return nullptr;
   }
 
-  // What is known of a field of a channel, once a value of it differed.
+  // The state of a field of a channel, once a value of it has differed.
   struct Known {
     std::string pattern;
     const DiffRule* rule = nullptr;

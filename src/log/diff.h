@@ -16,7 +16,7 @@
 
 namespace ruedo::log {
 
-// What may differ. A value passes when it is within any of the three tolerances; the last rule that
+// An allowed difference. A value passes within any of the three tolerances; the last rule that
 // matches a field applies.
 struct DiffRule {
   std::string channel = "*";  // shell patterns
@@ -77,8 +77,8 @@ struct Diff {
 };
 
 // Throws InputError when one of them is not a log, and when the rules ignore all of both. partial:
-// a log that is cut or damaged is compared up to there. goes_on: asked now and then; when it
-// returns false, the result so far is returned.
+// a log that is cut or damaged is compared up to there. goes_on: called now and then; if it
+// returns false, the comparison ends and its result is returned.
 Diff diff_logs(const std::string& golden, const std::string& other,
                const std::vector<DiffRule>& rules, bool partial = false,
                const std::function<bool()>& goes_on = {});

@@ -209,8 +209,8 @@ std::vector<std::string> ends_of(const std::string& path) {
   return {ends.rbegin(), ends.rend()};
 }
 
-// A file of that content in those folders whose path ends as the given one's does; "" where there
-// is none. A link may lead out of a folder: the finder says how far a log reaches.
+// A file of that content in those folders whose path ends as the given one's does; "" without one.
+// A link may lead out of a folder: the finder limits the reach of a log.
 std::string found_again(const log_file_t& file, const std::vector<fs::path>& folders,
                         const world::ResourceFinder& finder, Digests& digests) {
   std::error_code error;
@@ -264,14 +264,14 @@ void find_files_again(log_header_t& header, const std::string& log, Digests& dig
   for (log_file_t& file : header.files) {
     if (!fs::is_regular_file(file.path, error)) move(file, {beside, shipped});
   }
-  // What is there may be another installation's: ours is as good, and may be looked at.
+  // The file there may be another installation's: ours is as good, and is readable.
   const world::ResourceFinder finder(header.world_file, false);
   for (log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) move(file, {shipped});
   }
 }
 
-// The log may be a stranger's: it must not reveal which files are on this machine, not even by a
+// The log may be untrusted: it must not reveal which files are on this machine, not even by a
 // hash.
 void check_files(const log_header_t& header, const std::string& log, Digests& digests) {
   if (const std::string fault = fault_of_names(header); !fault.empty())
@@ -329,8 +329,8 @@ std::vector<std::string> machine_differences(const log_header_t& log, const log_
   compare("Ruedo", without_build(log.version), without_build(here.version));
   const auto architecture = [](const std::string& cpu) { return cpu.substr(0, cpu.find(' ')); };
   compare("processor", architecture(log.cpu), architecture(here.cpu));
-  // What is computed is the same on all of them, and with every C library; pictures are, unless
-  // they were to be fast.
+  // Computed results are the same on all of them, and with every C library; so are pictures, unless
+  // drawn fast.
   if (std::find(log.options.begin(), log.options.end(), "--fast-pixels") != log.options.end())
     compare("CPU features", log.cpu, here.cpu);
   compare("Mesa's environment", mesas_variables(log), mesas_variables(here));

@@ -38,8 +38,8 @@ std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
 
 // A log may have been made elsewhere. A file that is not at its path is looked for beside the log
 // and among Ruedo's own worlds, by the end of its path and its SHA-256. A file that is there but
-// may not be read for a stranger's log (another installation's) is looked for among Ruedo's own
-// worlds. The header then names what was found.
+// may not be read for an untrusted log (another installation's) is looked for among Ruedo's own
+// worlds. The header then has the paths that were found.
 void find_files_again(log_header_t& header, const std::string& log);
 
 // "", or what is wrong with the names of its files: too many, or longer than any file's. None of
@@ -63,7 +63,7 @@ void check_files_of_spawned(const std::string& log);
 // Of a log whose pictures Mesa's environment variables act on: an option for each, NAME=VALUE.
 constexpr std::string_view kMesaOption = "--mesa-environment=";
 
-// What else determines a run's bytes and differs here, a line each: Ruedo's version and sources,
+// Other causes of different bytes that differ here, a line each: Ruedo's version and sources,
 // the CPU, the C library, other libraries.
 std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
 

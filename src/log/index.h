@@ -26,8 +26,8 @@ class Index {
   static constexpr size_t kMostEdits =
       1'000;  // requests that changed the world, and as many SET_POSE; later ones are not followed
 
-  // Without places: what the log was made from and what changed its world, for those who read it
-  // from its beginning.
+  // Without places: the log's sources and the changes of its world, for readers that begin at its
+  // start.
   enum class Keeps { places, changes };
   struct Channel {
     std::string name;
@@ -40,7 +40,7 @@ class Index {
     applied_t applied;
   };
 
-  // Throws InputError for what is no log, and for one without a message.
+  // Throws InputError if the file is not a log, or has no message.
   explicit Index(const std::string& path, Keeps keeps = Keeps::places);
 
   const std::vector<Channel>& channels() const { return channels_; }

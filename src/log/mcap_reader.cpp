@@ -196,7 +196,7 @@ class McapFile {
     if (!fields.good()) damaged("has a damaged record");
   }
 
-  // What is kept: others write a schema again with each chunk.
+  // Kept once: other writers repeat a schema with each chunk.
   void note_names(uint8_t op, uint16_t id, uint64_t size) {
     uint64_t& kept = names_[{op, id}];
     all_names_ += size - std::exchange(kept, size);

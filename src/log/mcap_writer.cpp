@@ -55,7 +55,7 @@ std::string record(Op op, std::string_view fields) {
   return bytes;
 }
 
-// CRC-32 goes on from a part to the next.
+// CRC-32 continues from a part to the next.
 uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
   return crc32(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), before);
 }

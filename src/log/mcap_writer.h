@@ -21,8 +21,8 @@ class McapWriter {
 
   using Metadata = std::map<std::string, std::string>;
 
-  // profile: MCAP's word for whose conventions hold, "ros2". Throws as OutputFile, as all that
-  // follows does. What was at the path stays until finish().
+  // profile: MCAP's name of the conventions, "ros2". Throws as OutputFile, as all functions below.
+  // An older file at the path stays until finish().
   explicit McapWriter(const std::string& path, const std::string& profile = "");
   ~McapWriter();
 
@@ -37,7 +37,7 @@ class McapWriter {
   void finish();
 
   uint64_t messages() const { return messages_; }
-  uint64_t size() const { return offset_; }  // bytes of the file so far
+  uint64_t size() const { return offset_; }  // bytes written
 
  private:
   struct IndexEntry {

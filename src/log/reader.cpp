@@ -14,7 +14,7 @@
 namespace ruedo::log {
 namespace {
 
-// What others play: a bag's folder, and a file of MCAP, which begins with this.
+// Logs of other programs: a bag's folder, and a file of MCAP, which begins with this.
 constexpr uint32_t kMcap = 0x894D4341;
 
 [[noreturn]] void refuse_bag(const std::string& path) {

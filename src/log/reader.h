@@ -44,7 +44,7 @@ class Reader {
   const std::string& fault() const { return fault_; }
   const std::string& path() const { return path_; }
   int64_t size() const { return size_; }      // bytes of the file
-  int64_t offset() const { return offset_; }  // bytes read so far
+  int64_t offset() const { return offset_; }  // bytes read
 
  private:
   bool read_event(Event& event, const std::function<bool(const std::string&)>& wanted);

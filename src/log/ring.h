@@ -25,7 +25,7 @@ class Ring {
   // Each numbered file begins with what had changed the world by then: half of it at most.
   static constexpr int64_t kPreambleShare = 2 * kFiles;
 
-  // Removes the numbered files of an earlier run, and nobody else's. Throws EnvironmentError when a
+  // Removes the numbered files of an earlier run, and no others. Throws EnvironmentError when a
   // file cannot be created. wait: as Writer's.
   Ring(const std::string& path, int64_t limit, const std::function<void()>& wait = {});
 

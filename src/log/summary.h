@@ -1,5 +1,5 @@
-// What a log holds: its channels with types, counts, sizes and times, what it was made from, and
-// where it is damaged.
+// The summary of a log: its channels with types, counts, sizes and times, its sources, and its
+// damage.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ struct Summary {
 // Whether a file begins as an LCM log does. False where it cannot be read.
 bool is_log(const std::string& path);
 
-// Reads the log once, in constant memory. Throws InputError for what is no log.
+// Reads the log once, in constant memory. Throws InputError if the file is not a log.
 Summary summarize(const std::string& path);
 
 }  // namespace ruedo::log

@@ -30,7 +30,7 @@ class Writer {
   // Adds an event. After a failure this does nothing: see error().
   void write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size);
 
-  // Writes everything so far to the operating system.
+  // Writes all events to the operating system.
   void flush();
 
   // Whether its name still leads to the file, and the file holds all that was written: see error().
@@ -40,18 +40,18 @@ class Writer {
   void truncate();
 
   // Adds the events of another log that was written from its beginning and flushed, to an empty
-  // one. What went wrong, or "".
+  // one. Returns the error, or "".
   std::string append(const Writer& other);
-  // Adds so many events of a log, which lie at these bytes of its file. What went wrong, or "".
+  // Adds so many events of a log, which lie at these bytes of its file. Returns the error, or "".
   std::string append(const std::string& path, int64_t begin, int64_t end, int64_t events);
 
-  // What went wrong ("no space left on device"), or "". The file then ends with the last whole
+  // The error ("no space left on device"), or "". The file then ends with the last whole
   // event that had room.
   const std::string& error() const { return error_; }
   // After an error: others have removed, replaced or truncated the file.
   bool is_lost() const { return lost_; }
   const std::string& path() const { return path_; }
-  // Bytes so far, with what is not handed over yet.
+  // Bytes written, with those that are still buffered.
   int64_t size() const { return written_ + static_cast<int64_t>(buffer_.size()); }
   int64_t events() const { return events_; }
 

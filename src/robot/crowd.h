@@ -5,7 +5,7 @@
 // I. Farkas and T. Vicsek, "Simulating dynamical features of escape panic", Nature 407 (2000) 487
 // (eqs. 1 to 3), divided by their 80 kg; robots and other things by those of D. Helbing and P.
 // Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51 (1995) 4282 (eqs. 3, 4 and
-// 8), with a look-ahead of 2 s and half the weight for what is behind. Paths around walls are the
+// 8), with a look-ahead of 2 s and half the weight for things behind. Paths around walls are the
 // shortest over cells; obstacles on them are walked around. People push things like a moving wall,
 // and cannot be pushed.
 //

@@ -281,7 +281,7 @@ void KinematicDrive::look_at_support() {
   }
 }
 
-// What the wheels do to the robot they do to what carries it, the other way round.
+// The wheels push the body that carries the robot with the opposite force.
 void KinematicDrive::push_back(const Vec3& impulse) {
   const double part = 1.0 / static_cast<double>(carriers_.size());
   for (const Contact& contact : carriers_) {
@@ -299,7 +299,7 @@ void KinematicDrive::wake() {
   physics_->wake(body_);
 }
 
-// What the plugin's drive makes of the plan.
+// The plugin's drive converts the plan to its real velocity.
 Displacement KinematicDrive::follow_model(SimTime now) {
   const BaseVelocity asked{planned_.way / step_s_, planned_.side / step_s_,
                            planned_.angle / step_s_};
@@ -442,7 +442,7 @@ void KinematicDrive::after_step(SimTime now) {
   planner_.show_step();
 }
 
-// What the wheels, at the rates of the plan, make of speed and turn rate.
+// The speed and turn rate that the wheels give at the rates of the plan.
 PlaneMotion KinematicDrive::of_wheels() const {
   if (model_) return {made_.ahead, made_.turn};
   if (!description_->on_odometry) return {planner_.v(), planner_.omega()};

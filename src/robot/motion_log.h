@@ -1,5 +1,5 @@
-// What a robot's motion publishes at each step: the current state, and what ended or was refused
-// before it.
+// The messages of a robot's motion at each step: the current state, and motions that ended or were
+// refused before it.
 #pragma once
 
 #include <array>

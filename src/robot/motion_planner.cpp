@@ -196,7 +196,7 @@ void MotionPlanner::set_velocity(double v, double side, double omega, SimTime no
   replace_running();
   by_wheels_ = kind == Status::KIND_WHEELS;
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
-  // Any other command goes on with what it is known of the last one's progress.
+  // Any other command continues with the known progress of the last one.
   const bool anew = !holding_ || (!same && turns_round(v, side, omega));
   holding_ = true;
   deadline_ = drive_->watchdog_us > 0 ? now + drive_->watchdog_us : kNever;
@@ -214,7 +214,7 @@ void MotionPlanner::set_velocity(double v, double side, double omega, SimTime no
 }
 
 // From the last target to these: it stood, or shall stand, or goes the other way. The turn rate
-// only counts on the spot: who follows a wall corrects it all the time.
+// only counts on the spot: a wall follower corrects it all the time.
 bool MotionPlanner::turns_round(double v, double side, double omega) const {
   const auto stands = [](double x, double y, double turn) {
     return x == 0.0 && y == 0.0 && turn == 0.0;

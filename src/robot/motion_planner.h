@@ -1,5 +1,5 @@
-// What a robot has been commanded to do: turns commands and motion primitives into a plan of speed
-// and turn rate within the robot's limits, and a state to publish.
+// Plans a robot's commanded motion: converts commands and motion primitives to a plan of speed and
+// turn rate within the robot's limits, and a state to publish.
 //
 // A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's path does
 // not depend on the step size. A new command replans from the current velocities, so that nothing

@@ -7,7 +7,7 @@
 
 namespace ruedo::robot {
 
-// While a profile is being planned, its last segment marks the end of the plan so far.
+// While a profile is being planned, its last segment marks the end of the plan up to now.
 void Profile::add(double duration, double velocity, double acceleration) {
   if (!(duration > 0.0)) return;
   assert(count_ < kCapacity);

@@ -233,7 +233,7 @@ void Robots::Impl::add_collisions(const std::vector<Contact>& contacts, size_t f
   }
 }
 
-// What rests keeps its collisions.
+// A resting robot keeps its collisions.
 void Robots::Impl::read_collisions(Snapshot& snapshot) const {
   const ContactList& contacts = snapshot.contacts;
   snapshot.collisions.clear();

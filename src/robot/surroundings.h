@@ -1,5 +1,5 @@
-// Things that move on their own: conveyor belts (<ruedo:belt>), and doors that open for whoever
-// comes near (<ruedo:door>).
+// Things that move on their own: conveyor belts (<ruedo:belt>), and doors that open when a robot or
+// a person comes near (<ruedo:door>).
 #pragma once
 
 #include <vector>

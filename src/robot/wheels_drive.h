@@ -4,7 +4,7 @@
 // The plan of speed and turn rate (the same as for the kinematic drive) is converted to wheel rates
 // with the geometry that the robot believes it has. A servo on each wheel's encoder follows them:
 // torque = rate gain * (rate error) + angle gain * (angle error), within the torque limit and the
-// motor's torque-speed line. What the body does is physics. The robot knows its encoders only:
+// motor's torque-speed line. Physics moves the body. The robot knows its encoders only:
 // primitives measure distance by its odometry and do not notice slip. With <ruedo:yaw_gain>, its
 // gyro's heading replaces the odometry's, and a control loop turns the robot back to it.
 //
