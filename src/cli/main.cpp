@@ -46,7 +46,7 @@ namespace {
 
 using namespace ruedo::cli;
 
-// What is logged, on one line of bounded length: it may hold words of others, from the bus.
+// A log message as one line of bounded length: it may quote foreign texts from the bus.
 class LoggedText : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
@@ -124,8 +124,8 @@ void open_standard_streams() {
                                 std::strerror(errno));
 }
 
-// What is still to be printed may meet a full disk. A reader that has gone, as `| head` does, has
-// what it wanted.
+// The rest of the output may meet a full disk. A reader that has closed the pipe, as `| head` does,
+// needs no more.
 void flush_output() {
   if (std::fflush(stdout) != 0 && errno != EPIPE) fail_of_output();
 }
@@ -145,8 +145,8 @@ void forget_empty_variables() {
   for (const std::string& name : empty) ::unsetenv(name.c_str());
 }
 
-// Checks what threads and libraries cannot do without, and would hang or crash for want of, where
-// an error can still be reported.
+// Checks resources without which threads and libraries would hang or crash, while an error can
+// still be reported.
 void check_limits() {
   constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20, kStack = rlim_t{1} << 20;
   rlimit limit{};
@@ -288,7 +288,7 @@ int tell_error() {
   return kEnvironment;
 }
 
-// Where nobody handles it: in a thread that runs out of memory.
+// Where no handler catches it: in a thread that runs out of memory.
 [[noreturn]] void end_with_error() {
   if (!std::current_exception()) std::abort();
   int code = kEnvironment;

@@ -1,9 +1,9 @@
-// ruedo complete -- WORD... =LAST: what may stand for the last word of a command line, for the
+// ruedo complete -- WORD... =LAST: the candidates for the last word of a command line, for the
 // completion of shells (packaging/completion). It is not among the commands of --help. The last
 // word has a = before it, since it may be empty.
 //
-// It prints one word a line, then "files" in a line of its own, with a space before it, where a
-// file may stand there, too.
+// It prints one word a line, then "files" in a line of its own, with a space before it, if a
+// file is allowed there, too.
 #include <algorithm>
 
 #include <fmt/format.h>

@@ -151,7 +151,7 @@ std::string advice_on_no_server(const bus::LcmUrl& url) {
          ": start one with `ruedo run WORLD`, or set LCM_DEFAULT_URL or --lcm to its address";
 }
 
-// The address that is served, or would be: by this machine's claims, and by who answers there.
+// The address that is served, or would be: by this machine's claims, and by the server's replies.
 void check_server(Report& report, const bus::LcmUrl& url) {
   if (url.scheme == "memq")
     return report.good("server", url.str() + " stays inside of one process");
@@ -201,7 +201,7 @@ void check_renderer(Report& report) {
   }
 }
 
-// What the host says to libraries, and Ruedo does not let them hear.
+// Settings of the host for libraries, from which Ruedo shields them.
 void check_environment(Report& report) {
   std::vector<std::string> variables;
   for (const std::string& variable : scene::mesas_variables())
@@ -212,7 +212,7 @@ void check_environment(Report& report) {
                             fmt::join(variables, ", ")));
 }
 
-// Whether --ros2 would work. Where nothing speaks of ROS, that it would not is no fault.
+// Whether --ros2 would work. On a machine without ROS, a failure is not a fault.
 void check_ros2(Report& report) {
   constexpr const char* kVariables[] = {
       "ROS_DISTRO",          "ROS_DOMAIN_ID",    "ROS_AUTOMATIC_DISCOVERY_RANGE",
@@ -236,7 +236,7 @@ void check_ros2(Report& report) {
   }
 }
 
-// Whether raw pictures get through to readers with the QoS of sensor data, which nobody repeats.
+// Whether raw pictures reach readers with the QoS of sensor data, which does not retransmit.
 void check_pictures(Report& report) {
   constexpr const char* kWhat = "pictures on DDS";
   try {

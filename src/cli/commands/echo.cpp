@@ -29,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* kInfo = "ruedo/info";
 constexpr int kShownElements = 8;  // of an array
-// What waits to be shown; more is dropped and counted.
+// Messages waiting to be shown; more are dropped and counted.
 constexpr size_t kMostWaiting = 1000;  // messages
 constexpr size_t kMostWaitingBytes = 64 << 20;
 
@@ -194,7 +194,7 @@ int echo(const EchoArguments& arguments) {
   return kGood;
 }
 
-// What came on a channel within the last report's time.
+// The messages of a channel within the last report's time.
 struct Traffic {
   int64_t messages = 0, bytes = 0;
   Clock::time_point last;

@@ -35,7 +35,7 @@ uint64_t nanoseconds(SimTime time_us) {
 // So many bytes of a log foretell how large the whole will be.
 constexpr int64_t kForetells = int64_t{16} << 20;
 
-// Passes every message to `out`, and tells it when another world begins. size: of the file so far.
+// Passes every message to `out`, and notifies it of another world. size: of the file until now.
 // Returns the number of messages.
 template <class Export>
 uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds,

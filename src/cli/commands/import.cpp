@@ -26,7 +26,7 @@ struct ImportArguments {
   std::vector<std::string> sizes;  // the options that give one: each is for one kind of map
 };
 
-// A size that is given and has no effect would be a world of another size than was meant.
+// A size without an effect would give a world of an unexpected size.
 void check_sizes(const ImportArguments& arguments, const std::string& what,
                  const std::vector<std::string>& taken) {
   for (const std::string& name : arguments.sizes) {

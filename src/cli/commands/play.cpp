@@ -56,7 +56,7 @@ bool in_logs_only(const std::string& channel) {
 }
 
 // When a message is due that comes so much later than the first one. At a low speed that may be
-// more than a clock can say, which stands for a century.
+// more than a clock can hold: then it is a century.
 Clock::time_point due(Clock::time_point begin, SimTime after_us, double speed) {
   constexpr double kCentury_s = 3.2e9;
   const double after_s =
@@ -86,7 +86,7 @@ int show(const PlayArguments& arguments, double speed) {
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm cannot be used with --view: the page shows the log, and nothing is published");
-  const auto ready = [&] {  // whoever reads the address may end it
+  const auto ready = [&] {  // the reader of the address may end it
     heed(SIGINT);
     heed(SIGTERM);
     signals.reset();

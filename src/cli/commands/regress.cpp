@@ -161,13 +161,13 @@ void tell(const RegressArguments& arguments, const judge::Verdict& verdict) {
 
 int regress(RegressArguments arguments) {
   const bool keeps_log = !arguments.record.empty();
-  std::optional<TemporaryFolder> scratch;  // for who reads the log after the run
+  std::optional<TemporaryFolder> scratch;  // for readers of the log after the run
   if (!keeps_log && !(arguments.golden.empty() && arguments.script.empty())) {
     scratch.emplace("regress");
     arguments.record = *scratch / "run.lcm";
   }
   const bool isolated = !arguments.shared_network && isolate();
-  SignalThread signals;  // after isolate(), which wants to be alone
+  SignalThread signals;  // after isolate(), which needs a single thread
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const bool renew = is_told_to_renew() || arguments.renew;
   const std::shared_ptr<const world::WorldModel> world = load(arguments.world);

@@ -135,7 +135,7 @@ std::shared_ptr<const world::WorldModel> load(const RenderArguments& arguments) 
   return world;
 }
 
-// nullopt: nothing is taken off.
+// nullopt: without a cut.
 std::optional<double> height_to_cut_at(const RenderArguments& arguments,
                                        const world::WorldModel& world) {
   const bool from_outside = arguments.view == "top" || arguments.view == "iso";
@@ -222,7 +222,8 @@ void add_video_arguments(CLI::App& command, report::VideoArguments& arguments) {
       ->type_name("S")
       ->capture_default_str()
       ->check(within(0.001, 1000.0));
-  command.add_option("--from", arguments.from_s, "start of the video (s after the log's beginning)")
+  command
+      .add_option("--from", arguments.from_s, "start of the video (s after the log's beginning)")
       ->type_name("T");
   command.add_option("--to", arguments.to_s, "and where it ends, s")->type_name("T");
 }

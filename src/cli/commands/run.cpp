@@ -46,7 +46,7 @@ namespace {
 
 using foxglove::FoxgloveServer;
 
-// What was made for this run alone: who made it may have been killed by then.
+// Files made for this run alone: their maker may have been killed by then.
 class Temporary {
  public:
   explicit Temporary(const std::string& path) : path_(path), leftover_(path) {}
@@ -144,7 +144,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   return options;
 }
 
-// What clients need in order to find this server, when they would not by default.
+// The settings that clients need to find this server, if they would not by default.
 void announce(const bus::ServerBus& place) {
   if (!place.note.empty()) spdlog::warn(place.note);
   if (place.announce) fmt::print("{}\n", bus::export_line(place.url));
@@ -224,7 +224,7 @@ int run_world(const RunArguments& arguments) {
       arguments.foxglove ? FoxgloveServer::open(server, arguments.foxglove_address) : nullptr;
   place.claim->describe(
       fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
-  // From the first line on that says so: whoever reads it may end the run, and finds its log.
+  // From the first line on that says so: a program that reads it may end the run, and has its log.
   const SignalThread::Serving serving(signals, server);
   std::shared_ptr<void> view;
   const bool is_read = is_printed([&] {

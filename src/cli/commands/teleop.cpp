@@ -31,7 +31,7 @@ constexpr int kRepeat_ms = 100;  // well within a robot's watchdog
 constexpr double kStep_m_s = 0.1, kStep_rad_s = 0.2;
 // A text that is pasted presses "w" a thousand times.
 constexpr double kMost_m_s = 20.0, kMost_rad_s = 10.0;
-// What comes in place of a key.
+// Events other than a key.
 constexpr int kNone = 0, kEnd = -1, kSuspend = -2, kContinue = -3;
 
 // Signals, to be read beside the keys: the robot is stopped first, and the terminal left as it was.
@@ -56,7 +56,7 @@ class Signals {
     const auto number = static_cast<int>(signal.ssi_signo);
     return number == SIGTSTP ? kSuspend : number == SIGCONT ? kContinue : kEnd;
   }
-  // As if SIGTSTP were not blocked; returns when the process goes on.
+  // As if SIGTSTP were not blocked; returns when the process continues.
   void suspend() {
     raise(SIGTSTP);
     sigset_t suspending;
@@ -81,10 +81,10 @@ class RawTerminal {
   ~RawTerminal() { leave(); }
 
   // Whether this process is in the foreground. In the background the terminal is another's, and the
-  // kernel stops whoever changes it.
+  // kernel stops a process that changes it.
   static bool is_ours() {
     const pid_t group = tcgetpgrp(STDIN_FILENO);
-    return group < 0 || group == getpgrp();  // < 0: it is no controlling terminal
+    return group < 0 || group == getpgrp();  // < 0: not a controlling terminal
   }
   // Again, too, where somebody else has changed it meanwhile, as a shell does.
   void enter() {
@@ -109,7 +109,7 @@ class Keys {
  public:
   explicit Keys(Signals& signals) : signals_(signals) {}
 
-  // What comes within that time: a key, kNone, or what else there is.
+  // The event within that time: a key, kNone, or another one.
   int next(int timeout_ms) {
     if (taken_ == came_) {
       pollfd waiting[2] = {{STDIN_FILENO, POLLIN, 0}, {signals_.file(), POLLIN, 0}};
@@ -150,8 +150,8 @@ class Keys {
   Place place_ = Place::between;
 };
 
-// Whether the robot is there and where it takes velocities, as ruedo/info tells; until that has
-// come, it is, on the channel of every robot. Hears in the bus's thread.
+// Whether the robot exists and its velocity channel, by ruedo/info; until that arrives, it counts
+// as existing, with the usual channel. Listens in the bus's thread.
 class Presence {
  public:
   explicit Presence(const std::string& robot) : robot_(robot), channel_(robot + "/velocity") {}
@@ -182,7 +182,7 @@ class Presence {
  private:
   const std::string robot_;
   int next_part_ = 0;
-  bool found_ = false;  // in the parts so far
+  bool found_ = false;  // in the parts received
   std::atomic<bool> is_there_{true}, has_left_{false};
   mutable std::mutex mutex_;
   std::string channel_;
@@ -267,7 +267,7 @@ int teleop(const TeleopArguments& arguments) {
       driver.stop();
       terminal.leave();
       signals.suspend();
-      continue;  // with the signal that ended it: it goes on, or is to end
+      continue;  // with the signal that ended it: it continues, or must end
     }
     if (key == kContinue || !terminal.entered()) terminal.enter();
     driver.press(key);

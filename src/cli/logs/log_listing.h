@@ -1,11 +1,11 @@
-// What a log holds, printed for people or as JSON: ruedo info LOG.
+// Prints the contents of a log, for people or as JSON: ruedo info LOG.
 #pragma once
 
 #include <string>
 
 namespace ruedo::cli {
 
-// Throws InputError for what is no log.
+// Throws InputError if the file is not a log.
 void print_log(const std::string& path, bool json);
 
 }  // namespace ruedo::cli

@@ -22,8 +22,8 @@ struct LoggedOptions {
 // is not known.
 LoggedOptions read_options(const log_header_t& header, const std::string& log);
 
-// What `repeat` returns. An option that is wrong there was not typed by the user, it stands in the
-// log: the InputError that it makes names the log.
+// The result of `repeat`. The user did not type its options, the log has them: an InputError for
+// one names the log.
 template <typename Repeat>
 auto with_options_of(const std::string& log, Repeat repeat) {
   try {

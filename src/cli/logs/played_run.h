@@ -1,7 +1,7 @@
-// What clients ask of a run, answered for one that is played from its log: connect() works on it.
+// Answers clients' requests for a run that is played from its log: connect() works on it.
 //
-// The log has no ruedo/info: it is made from the header, as the run's world changed. It names no
-// request and no command, so that clients refuse what would change the run.
+// The log has no ruedo/info: it is made from the header, as the run's world changed. It lists no
+// request and no command, so that clients refuse to change the run.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@ namespace ruedo::cli {
 
 class PlayedRun {
  public:
-  // Listens on the bus. A world that cannot be read is reported, and only the channels are told.
+  // Listens on the bus. A world that cannot be read is reported, and info has only the channels.
   PlayedRun(const std::string& path, bus::LcmBus& bus);
   PlayedRun(const PlayedRun&) = delete;
   PlayedRun& operator=(const PlayedRun&) = delete;
@@ -28,7 +28,7 @@ class PlayedRun {
   void serve(SimTime time_us);
   bool serves() const { return worlds_ != nullptr; }  // else it is played without ruedo/info
   bool asked() const { return asked_; }               // by a client, since the last info
-  void end();                                         // tells clients that the log is over
+  void end();                                         // notifies clients of the log's end
 
  private:
   void make_worlds(const std::string& path);

@@ -1,4 +1,4 @@
-// What holds for the arguments of every command.
+// Rules for the arguments of every command.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace ruedo::cli {
 
-// An argument that takes a value takes no empty one: `--record "$LOG"` without a LOG must not mean
-// that nothing is recorded. Nor one with control characters, since values are printed, and names of
-// files may come from a stranger's archive. A flag takes none. Of all commands below app, before it
+// Refuses empty values of arguments: `--record "$LOG"` without a LOG must not mean that nothing is
+// recorded. Refuses control characters, since values are printed, and names of files may come from
+// an untrusted archive. Refuses values of flags. For all commands below app, before it
 // parses.
 void refuse_odd_values(CLI::App& app);
 
@@ -19,8 +19,8 @@ std::string is_seed(const std::string& text);
 // Whether two names are of one file, which need not be there yet. A device is another each time.
 bool same_file(const std::string& a, const std::string& b);
 
-// What a command writes must be none of what it reads, nor another file that it writes. Throws
-// InputError. Of a command that was parsed.
+// Refuses output files that the command also reads, or writes twice. Throws InputError. For a
+// parsed command.
 void check_outputs(const CLI::App& command);
 
 }  // namespace ruedo::cli

@@ -21,7 +21,7 @@ namespace {
 
 constexpr int32_t kLeft = -1;  // as an epoch: the client has closed its connection
 
-// The last two numbers of a line, which say who it is from, taken off it; nothing: it has none.
+// Removes the last two numbers of a line, which identify its client; nothing if it has none.
 std::optional<std::pair<int64_t, int64_t>> take_sender(std::string& line) {
   int64_t numbers[2] = {};
   for (int64_t* const number : {&numbers[1], &numbers[0]}) {

@@ -1,10 +1,10 @@
-// How far a regression's client has come: the run waits for it, at any rate.
+// The progress of a regression's client: the run waits for it, at any rate.
 //
-// Clients of Ruedo's libraries write how far they are to a pipe that they inherit (RUEDO_PROGRESS
-// is its descriptor), as a program that launched a server does, with who they are in each line. The
-// run waits for the slowest. Until the first word of any client, and after the last of those that
-// write has ended, the run waits for the next one; a client that does not write, a plain LCM
-// program, is not waited for once it was heard.
+// Clients of Ruedo's libraries write their progress to a pipe that they inherit (RUEDO_PROGRESS is
+// its descriptor), as a program that launched a server does, with their identity in each line. The
+// run waits for the slowest. Before the first line of any client, and after the last writing client
+// has ended, the run waits for the next one; it does not wait for a client that writes no line, a
+// plain LCM program, once it was heard.
 #pragma once
 
 #include <atomic>
@@ -58,7 +58,7 @@ class ClientPace {
   std::mutex mutex_;
   run::Run* run_ = nullptr;
   std::map<Client, Known> clients_;
-  bool followed_ = false;  // the run was told how far they are
+  bool followed_ = false;  // the run has their progress
   std::string said_;
   std::thread thread_;
 };

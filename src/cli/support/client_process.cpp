@@ -70,7 +70,7 @@ ClientProcess::ClientProcess(const std::string& command, const std::vector<std::
     ::execle(kShell, "bash", "-c", script.c_str(), nullptr, pointers.data());
     ::_exit(127);
   }
-  ::setpgid(pid_, pid_);  // whoever of the two comes first
+  ::setpgid(pid_, pid_);  // whichever of the two processes runs first
   leftover_.emplace(pid_);
   waiter_ = std::thread([this, ended = std::move(ended)] {
     siginfo_t info;

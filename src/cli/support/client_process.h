@@ -20,24 +20,24 @@ class ClientProcess {
  public:
   // Runs `command` by bash, with the variables ("NAME=VALUE") added to the environment, and with
   // the descriptors of `inherited` open. The exit code of each part counts: the first command that
-  // fails ends it (`set -e`); a pipeline fails as one of its programs does; what runs in the
-  // background is waited for. `ended` is called, from a
-  // thread of its own, when it ends. Throws EnvironmentError when there are no processes.
+  // fails ends it (`set -e`); a pipeline fails as one of its programs does; background processes
+  // are waited for. `ended` is called, from a thread of its own, when it ends. Throws
+  // EnvironmentError if no process can be started.
   ClientProcess(const std::string& command, const std::vector<std::string>& variables,
                 std::function<void()> ended, const std::vector<int>& inherited = {});
   ~ClientProcess();
 
   bool is_over() const { return over_; }
 
-  // Ends it: it may end by itself for half of that time, then it is asked to by SIGTERM, and killed
-  // when the time is over.
+  // Ends it: it may end by itself for half of that time, then it gets SIGTERM, and SIGKILL when the
+  // time is over.
   void end(std::chrono::duration<double> grace);
 
   // Waits until it has ended by itself.
   void wait();
 
-  // What is wrong with how it ended: "exit code 3", "signal 11"; "" for exit code 0, and where it
-  // obeyed SIGTERM. After end() or wait().
+  // The fault of its end: "exit code 3", "signal 11"; "" for exit code 0, and if it obeyed
+  // SIGTERM. After end() or wait().
   std::string fault() const;
   bool was_told_to_end() const { return told_; }
   bool was_killed() const { return killed_; }

@@ -1,5 +1,5 @@
-// What the commands of the program share: how a command is added, the options that say which world
-// to load, exit codes, and printing.
+// Shared parts of the program's commands: their registration, the options for the world, exit
+// codes, and printing.
 //
 // A command is one file: a function that adds a subcommand, and one registration at its end.
 #pragma once
@@ -77,7 +77,7 @@ const char* kind_name(Finding::Kind kind);  // "unsupported", "repaired", "error
 // One line a group on stderr.
 void print_findings(const std::vector<Finding>& findings);
 
-// Colours for a stream, empty when it is no terminal or NO_COLOR is set.
+// Colours for a stream, empty if it is not a terminal or NO_COLOR is set.
 struct Style {
   const char *bold = "", *dim = "", *red = "", *yellow = "", *green = "", *cyan = "", *off = "";
 };

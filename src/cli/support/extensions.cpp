@@ -10,7 +10,7 @@
 namespace ruedo::cli {
 namespace {
 
-// What one command line gave: a process reads one.
+// The options of the command line: a process has one.
 std::vector<std::string> plugin_files, type_places;
 
 }  // namespace
@@ -33,7 +33,7 @@ std::vector<std::string> plugin_options() {
   return options;
 }
 
-// A log may be a stranger's, so it names a plugin without its path. wanted: NAME@SHA256.
+// A log may be untrusted, so it has a plugin's name without its path. wanted: NAME@SHA256.
 void load_logged_plugin(const std::string& wanted, const std::string& log) {
   const std::string name = wanted.substr(0, wanted.rfind('@')),
                     hash = name.size() < wanted.size() ? wanted.substr(name.size() + 1) : "";
@@ -43,7 +43,7 @@ void load_logged_plugin(const std::string& wanted, const std::string& log) {
                      "its run had the plugin " + name +
                          ", which is in no folder of RUEDO_PLUGIN_PATH; --plugin FILE gives it");
   }
-  // What is loaded may have been so since before the file was written anew.
+  // The loaded library may be older than the file, if that was rewritten.
   if (sha256_of_file(file) != hash || load_plugin(file).sha256 != hash)
     throw InputError(
         {log}, "its run had another " + name + " than " + file + " (its sha256 was " + hash + ")");

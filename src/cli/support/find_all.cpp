@@ -12,7 +12,7 @@
 namespace ruedo::cli {
 namespace {
 
-// Pictures that are there and cannot be decoded. Readers leave that to who draws: it takes long.
+// Existing pictures that cannot be decoded. Readers leave decoding to the renderer: it takes long.
 void check_textures(const world::WorldModel& world, std::vector<Finding>& findings) {
   std::set<std::string> seen;
   const auto look = [&](const world::Material& material, const std::string& owner) {

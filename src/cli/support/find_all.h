@@ -7,7 +7,7 @@
 
 namespace ruedo::cli {
 
-// What the readers, the devices and the physics found, and pictures that cannot be decoded.
+// The findings of readers, devices and physics, and pictures that cannot be decoded.
 // refusal: the exit code with which `ruedo run` would refuse it, or kGood. Throws InputError for a
 // wrong command line alone.
 std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal);

@@ -78,7 +78,7 @@ class Removed {
   std::string path_;
 };
 
-// What differs from the golden log, or "".
+// The difference from the golden log, or "".
 std::string compare(const Golden& golden, const std::string& kept) {
   const log::Diff result = log::diff_logs(golden.log, kept, golden.rules);
   for (const std::string& line : result.idle_rules) spdlog::warn(line);

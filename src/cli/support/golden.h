@@ -1,4 +1,4 @@
-// A golden log: what a run is held against, or what is written anew.
+// A golden log: a run is compared with it, or renews it.
 #pragma once
 
 #include <string>
@@ -15,11 +15,11 @@ struct Golden {
   std::string html;                  // a page that shows what does; "": none
 };
 
-// What is compared lies beside the log of the run, under its name and this.
+// The compared messages are stored beside the log of the run, under its name and this.
 inline constexpr const char* kKept = ".kept";
 
-// Holds a run's log against it, or writes it anew. What is wrong, or "". Throws InputError where a
-// pattern of `keep` fits no channel, and EnvironmentError.
+// Compares a run's log with it, or renews it. Returns the difference, or "". Throws InputError if a
+// pattern of `keep` matches no channel, and EnvironmentError.
 std::string hold_to_golden(const Golden& golden, const std::string& record, bool renew);
 
 // By RUEDO_RENEW. Throws InputError for what is neither yes nor no.

@@ -25,7 +25,7 @@
 namespace ruedo::cli {
 namespace {
 
-// What the judge hears of a run.
+// Passes a run's states and messages to the judge.
 class JudgeSink : public run::Sink {
  public:
   JudgeSink(judge::Judge& judge, run::Run& run) : judge_(judge), run_(run) {}
@@ -195,7 +195,7 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
   std::atomic<SimTime> ended_at{-1};
   const std::unique_ptr<ClientProcess> client = start_client(options, place.url, pace, [&] {
     ended_at = now.load();
-    // A run that waits for nobody may not have begun: it has a step at least.
+    // A run that waits for no client may not have begun: it has one step at least.
     client_is_over = true;
     if (options.waits || awaits_peers || now > 0) server.stop();
   });

@@ -24,7 +24,7 @@ struct JudgedRunOptions {
   double timeout_s = 600.0;   // real time without a step, after which the run is ended
 };
 
-// A world of which parts are missing is not the one that was meant.
+// A world with missing parts is not the intended one.
 judge::Check world_check(const Finding& error);
 
 // Returns the checks of the client, of what ended the run, and of what came into the world.

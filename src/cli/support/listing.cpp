@@ -1,5 +1,5 @@
-// Prints what ruedo/info tells clients, for people: one column each for channel, type, rate and
-// what it is.
+// Prints ruedo/info for people: one column each for channel, type, rate and
+// kind.
 #include "cli/support/listing.h"
 
 #include <algorithm>
@@ -150,7 +150,7 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
 
 namespace {
 
-// Infinity is no limit: it executes commands at once.
+// Infinity means unlimited: it executes commands at once.
 std::string accelerations(const robot_info_t& robot) {
   std::string limited, at_once;
   const auto add = [&](const char* does, double limit, const char* unit) {

@@ -25,7 +25,7 @@ using Clock = Progress::Clock;
 constexpr auto kNext = std::chrono::milliseconds(200);
 constexpr double kEnoughToGuess_s = 2.0;  // of what was done, before the rest is guessed from it
 
-// A quick command needs no line. Tests want one at once.
+// A quick command needs no line. Tests need one at once.
 std::chrono::milliseconds first_after() {
   const char* named = std::getenv("RUEDO_PROGRESS_AFTER_MS");
   return std::chrono::milliseconds(named != nullptr ? std::atoi(named) : 1000);

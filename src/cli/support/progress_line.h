@@ -1,6 +1,6 @@
-// One line on a terminal that says how far a command is, when it takes longer than a second: what
-// it does, the part that is done, and the time that is left. Standard error only; nothing where
-// that is no terminal.
+// One line on a terminal with the progress of a command that takes longer than a second: its task,
+// the finished part, and the remaining time. Standard error only; nothing if that is not a
+// terminal.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What an option of numbers allows: from least to most, both included. CLI::Range takes "nan", too.
+// The allowed range of an option: from least to most, both included. CLI::Range takes "nan", too.
 #pragma once
 
 #include <string>

@@ -121,7 +121,7 @@ std::string nodes_that_do_not_hear() {
 namespace {
 
 constexpr size_t kMostQueued = size_t{64} << 20;           // bytes
-constexpr auto kLook = std::chrono::milliseconds(10);      // between two looks at who is there
+constexpr auto kLook = std::chrono::milliseconds(10);      // between two looks at the participants
 constexpr auto kSettled = std::chrono::milliseconds(300);  // since the last one came
 constexpr auto kPatience = std::chrono::seconds(1);
 
@@ -251,7 +251,7 @@ class CycloneNode : public Ros2Node {
 
 std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
-  distro_of(arguments);  // before a network is asked
+  distro_of(arguments);  // before the network is used
   if (const std::string deaf = nodes_that_do_not_hear(); !deaf.empty())
     spdlog::warn("ROS 2: {}", deaf);
   return std::make_unique<CycloneNetwork>();

@@ -52,8 +52,8 @@ class Ros2Network {
 // A node, from its making on; the run's messages come to it once it is attached.
 class Ros2Node {
  public:
-  // Null without a network. Throws InputError, and EnvironmentError when this build has no Cyclone
-  // DDS or there is no network for it.
+  // Null without a network. Throws InputError, and EnvironmentError if this build has no Cyclone
+  // DDS or no network for it exists.
   static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments,
                                         std::unique_ptr<Ros2Network> network);
 
@@ -79,8 +79,8 @@ Ros2Pictures ros2_pictures();
 // Why nodes of this environment would not hear a run; "": they would.
 std::string nodes_that_do_not_hear();
 
-// The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that
-// takes commands.
+// The input channel of each ROS topic among --wait-for. Throws InputError for a topic without
+// commands.
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
                                               const world::WorldModel& world,
                                               const Ros2Arguments& arguments);

@@ -1,4 +1,4 @@
-// What a world is served with, for the commands that do it: run and edit.
+// The options and parts for serving a world, for the commands run and edit.
 #pragma once
 
 #include <cstdint>

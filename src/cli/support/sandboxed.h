@@ -1,4 +1,4 @@
-// --sandbox of the commands that read files of strangers.
+// --sandbox of the commands that read untrusted files.
 #pragma once
 
 #include <string>

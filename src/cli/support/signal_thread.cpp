@@ -33,7 +33,7 @@ void SignalThread::wait() {
   for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
     if (done_) return;
     run::Run* server = server_;
-    if (!server || told_ != 0) {  // there is no run to end cleanly, or it does not end
+    if (!server || told_ != 0) {  // without a run to end cleanly, or if it does not end
       remove_leftovers();
       std::_Exit(128 + signal);
     }

@@ -27,7 +27,7 @@
 namespace ruedo::cli {
 namespace {
 
-// For logs that a page records. From another machine nobody learns where files lie.
+// For logs that a page records. A page on another machine does not learn where files are.
 std::vector<uint8_t> log_header(run::Run& run, uint64_t seed,
                                 const std::vector<std::string>& options, bool with_folders) {
   log_header_t header = log::make_log_header(*run.world(), seed, options);

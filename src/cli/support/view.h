@@ -20,7 +20,7 @@ class RunView {
   RunView(bool viewed, const std::string& address);
   ~RunView();
 
-  // What the run's options must hold.
+  // The required options of the run.
   void follow(run::RunOptions& options);
 
   // Serves the console for as long as the returned object lives, and prints where. Null when it is
@@ -35,13 +35,13 @@ class RunView {
 
 // Serves the console with a recorded run for as long as the returned object lives, and prints
 // where, after a call of ready(). speed: log time per real time. other: a log to compare it with;
-// "" for none. Throws InputError for what is no log, and EnvironmentError as RunView does.
+// "" for none. Throws InputError if the file is not a log, and EnvironmentError as RunView does.
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed,
                                const std::string& other, const std::function<void()>& ready);
 
-// Writes a recorded run as one HTML file that needs no server, of that size at most, and says what
-// is in it. Throws InputError for what is no log or does not fit, and EnvironmentError when the
-// file cannot be written or this build has no console.
+// Writes a recorded run as one HTML file that needs no server, of that size at most, and prints
+// its contents. Throws InputError if the file is not a log or does not fit, and EnvironmentError if
+// the file cannot be written or this build has no console.
 void write_page(const std::string& log, const std::string& path, double most_megabytes);
 
 }  // namespace ruedo::cli
