@@ -30,7 +30,7 @@ class Board {
     int64_t fingerprint = 0;
     std::optional<size_t> part_at;  // offset of the number of the part
     bool replies = false, layers = false;
-    int watchers = 0;  // viewers that want it
+    int watchers = 0;  // viewers that subscribed
   };
 
   // Adds channels up to that one. Names that are not UTF-8 are shown with '?'.

@@ -1,5 +1,5 @@
-// What clients drew in a run (markers_t), from its log: the newest message of each layer at any
-// moment. Only the messages' places are kept.
+// The drawings of clients in a run (markers_t), from its log: the newest message of each layer at
+// any time. Only the messages' places are kept.
 #pragma once
 
 #include <cstdint>

@@ -304,7 +304,7 @@ void Events::replied(std::span<const uint8_t> message) {
 EventScan::EventScan(const log::Index& index, const world::WorldModel* world) {
   if (world) events_.plan(world->faults);
   const auto& channels = index.channels();
-  // If the log records everything that acted, the messages that asked for it add nothing.
+  // If the log records everything that acted, the request messages add nothing.
   const bool written = std::any_of(channels.begin(), channels.end(), [](const auto& channel) {
     return channel.name == log::kAppliedChannel;
   });

@@ -44,7 +44,7 @@ class Events {
   void plan(const std::vector<world::Fault>& faults);
   // Messages in order of arrival. An incomplete message gives no event.
   void hear(double time_s, const std::string& channel, std::span<const uint8_t> message);
-  // The number of messages that could not be sent so far.
+  // The number of messages that could not be sent until now.
   void lost(uint64_t count);
 
   // In order of occurrence.

@@ -32,7 +32,7 @@ std::optional<double> number_of(const FieldValue& value) {
   return std::nullopt;
 }
 
-// What is plotted of a message: the number at a path ("vel[0]"), or the least, the largest, the
+// The plotted value of a message: the number at a path ("vel[0]"), or the least, the largest, the
 // mean or the sum of an array's finite elements ("min(ranges)"). web/src/wire/fields.ts has the
 // same.
 class PlottedField {

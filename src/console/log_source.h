@@ -20,8 +20,8 @@ class LogSource : public Source {
   static constexpr size_t kMostFields = 16;            // of a channel in one plot
   static constexpr size_t kScanned = 2'000;            // messages scanned for events at a time
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; larger ones are not shown
-  // Bytes that are read for a plot, and for all viewers at a time: what one of them asks for holds
-  // nobody up for longer.
+  // Bytes that are read for a plot, and for all viewers at a time: the request of one viewer delays
+  // the others no longer.
   static constexpr size_t kMostForPlot = 256u << 20, kMostAtATime = 64u << 20;
   // Bytes of the messages that all viewers' boards hold; what has no room is not shown.
   static constexpr size_t kMostHeld = 256u << 20;

@@ -1,4 +1,4 @@
-// What a console shows: a running server, or a recorded log. Used by the console's thread only.
+// The source of a console: a running server, or a recorded log. Used by the console's thread only.
 #pragma once
 
 #include <cstdint>
@@ -50,8 +50,8 @@ class Source {
 
   // Brings news to the board. viewers: whether anybody watches.
   virtual void pump(Board& board, bool viewers) = 0;
-  // There is another viewer, or a viewer wants another channel, which the board knows: from now on
-  // nothing on it may be missed, including the reply to the viewer's next request.
+  // Another viewer has come, or a viewer subscribes to another channel, which the board knows: from
+  // now on no message on it may be missed, including the reply to the viewer's next request.
   virtual void attend(const Board& board) { static_cast<void>(board); }
 
   // For the board's channel.
@@ -63,10 +63,10 @@ class Source {
   // Passes on a viewer's message to the simulation; false if none is accepted.
   virtual bool command(const std::string& channel, std::span<const uint8_t> message) = 0;
 
-  // The world to show; the pointer changes when the world does; null if there is none. scene: which
+  // The world to show; the pointer changes when the world does; null without one. scene: which
   // scene of a log.
   virtual std::shared_ptr<const world::WorldModel> world(size_t scene) = 0;
-  // "" or why there is no world.
+  // "" or the reason why it has no world.
   virtual std::string fault() const { return {}; }
   // The channel of world_info_t.
   virtual std::string info_channel() const = 0;
@@ -76,7 +76,7 @@ class Source {
     static_cast<void>(name);
     return {};
   }
-  // log_header_t of a running server, for logs that a page records; null if there is none.
+  // log_header_t of a running server, for logs that a page records; null without one.
   virtual http::Bytes log_header() { return nullptr; }
   // The file written by SAVE; "" for none.
   virtual std::string save_name() const { return {}; }

@@ -1,4 +1,4 @@
-// What goes through a run, for the console: messages that it publishes, and the commands and
+// Collects a run's traffic for the console: messages that it publishes, and the commands and
 // requests that reach it by any route.
 //
 // The publisher pays two counters per message, and a copy of those that a viewer watches and of the
@@ -19,7 +19,7 @@
 
 namespace ruedo::console {
 
-// The traffic on a channel so far.
+// The traffic on a channel since the start.
 struct Traffic {
   std::string name;
   uint32_t index = 0;  // its number among the channels
@@ -30,7 +30,7 @@ struct Traffic {
 
 class Tap : public run::Sink {
  public:
-  // What a client has drawn (markers_t).
+  // The drawing of a client (markers_t).
   struct Drawing {
     uint32_t channel;
     std::string layer;
@@ -58,8 +58,8 @@ class Tap : public run::Sink {
   size_t channel_count() const { return count_.load(std::memory_order_acquire); }
   Traffic& channel(size_t index) const { return *list_[index].load(std::memory_order_acquire); }
   OfferRing& ring() { return ring_; }
-  // What was drawn since the last call, the newest of each layer: also while nobody watches, for
-  // later viewers.
+  // The drawings since the last call, the newest of each layer: also without a viewer, for later
+  // viewers.
   std::vector<Drawing> take_drawn();
 
   // The newest state of the bodies.
@@ -67,8 +67,8 @@ class Tap : public run::Sink {
     uint32_t channel = 0;
     std::vector<std::vector<uint8_t>> parts;
   };
-  // The state, if it was neither offered nor taken before: a paused run sends no further one to new
-  // viewers. Empty if there is none, or if its channel is beyond the limit.
+  // The state, if it was neither offered nor read before: a paused run sends no further one to new
+  // viewers. Empty without one, or if its channel is beyond the limit.
   State take_state(size_t channels);
 
  private:

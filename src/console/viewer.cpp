@@ -233,7 +233,7 @@ bool Viewer::next_events(std::string& text) {
 }
 
 // A frame: its kind (4 bytes), then for each message channel (4 bytes), size (4 bytes), bytes. In
-// order of arrival over all channels: an answer is newer than what was said before it.
+// order of arrival over all channels: a reply is newer than all messages before it.
 bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   if (wanted_names_.empty()) return false;
   match_names();

@@ -1,4 +1,4 @@
-// One browser: what it wants to see, what it has received, and what it asks for.
+// One browser: its subscriptions, its progress of receiving, and its requests.
 //
 // A viewer gets new messages only after it has received the previous ones, so a slow viewer gets
 // fewer of them.
@@ -19,12 +19,12 @@ namespace ruedo::console {
 
 class Viewer;
 
-// What all viewers share.
+// The shared state of all viewers.
 struct Stage {
   Board board;  // for a running server
   std::unique_ptr<Source> source;
   std::string greeting;        // JSON, the first message to a viewer
-  std::string farewell;        // JSON, the last one; "" while it goes on
+  std::string farewell;        // JSON, the last message; "" while the run continues
   uint64_t world_version = 0;  // for a running server; changes when the scene does
   std::vector<Viewer*> viewers;
   bool is_log = false;
