@@ -63,7 +63,7 @@ struct Batch {
   // By step; null: none. Includes those that the batch's steps draw by.
   std::shared_ptr<const std::vector<Reseeding>> reseedings;
 
-  // Null: everything is read. Pictures that nobody reads are not drawn.
+  // Null: everything is read. Pictures without a reader are not drawn.
   std::shared_ptr<const ReadChannels> read;
 
   struct Output {

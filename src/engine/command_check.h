@@ -1,4 +1,4 @@
-// What a robot's model makes impossible of a command, in words: for the log, and for clients in
+// The reason why a robot's model cannot execute a command, for the log, and for clients in
 // lockstep. The robot itself refuses more, such as values out of range; ROBOT/motion shows it.
 #pragma once
 

@@ -44,7 +44,7 @@ class CommandInbox {
   CommandInbox(std::vector<Input> inputs, int robots);
 
   // Checks a message and stores it; a faulty one is counted, and logged at most once a second. A
-  // motion primitive with a number is taken once, however often it is sent. Any thread.
+  // motion primitive with a number is executed once, however often it is sent. Any thread.
   void put(const std::string& channel, const uint8_t* data, size_t size);
 
   // Requests a reset of a robot's odometry, with the request's body for the log. Any thread.
@@ -76,7 +76,7 @@ class CommandInbox {
   void reset_time();  // steps count from 0: scheduled commands are dropped
   // Takes the waiting commands of another copy of the world, while nothing is received or applied.
   void copy_from(const CommandInbox& other) { waits_ = other.waits_; }
-  // What waits is not part of a written state.
+  // Waiting commands are not part of a written state.
   void exchange(StateArchive& archive) { archive(waits_.next_step); }
 
   uint64_t refused() const { return refused_; }      // faulty messages
@@ -127,7 +127,7 @@ class CommandInbox {
   int64_t last_warning_ns_ = 0;  // for the bus's thread
 };
 
-// What is wrong with the values of a fault or of markers that can be decoded; "": nothing.
+// The error in the values of a fault or of markers that can be decoded; "": none.
 std::string check_values(Input::Kind kind, const uint8_t* data, size_t size);
 
 // Whether all of its values are finite.

@@ -28,7 +28,7 @@ namespace ruedo::engine {
 namespace {
 
 const std::atomic<bool> kNeverLeftOff{false};
-constexpr int64_t kStepsAtOnce = 200;  // between looks at whether step() goes on
+constexpr int64_t kStepsAtOnce = 200;  // between looks at whether step() may continue
 
 // Sets rounding and denormal modes as in every computing thread, whatever the caller's program
 // uses; restores them at the end.
@@ -50,7 +50,7 @@ bool same_name(const std::string& a, const std::string& b) {
   });
 }
 
-// What is read in another way than it is written is another world.
+// A file that is read otherwise than it is written gives another world.
 void refuse_errors(const world::WorldModel& model) {
   for (const Finding& finding : model.findings) {
     if (finding.kind == Finding::Kind::error)
@@ -248,8 +248,8 @@ Engine::Copy& Engine::sound_copy(size_t index) const {
   return copy;
 }
 
-// Returns what a handler threw; then it is told nothing more, and the steps are computed all the
-// same.
+// Returns a handler's exception; then the handler gets no further call, and the steps are still
+// computed.
 std::exception_ptr Engine::compute(size_t index, Copy& copy, int64_t steps) {
   std::exception_ptr handlers;
   World& world = *copy.world;
@@ -484,7 +484,7 @@ void Engine::reset(std::span<const Reset> resets) {
                        "world " + std::to_string(reset.world) + " is to be reset twice at once");
     named[reset.world] = true;
   }
-  // What may be refused is made before anything is changed.
+  // Everything that may be refused is made before any change.
   std::vector<std::unique_ptr<Copy>> made(resets.size());
   for_each(resets.size(), [&](size_t i) { made[i] = make_other(resets[i]); });
   for_each(resets.size(), [&](size_t i) { reset_one(resets[i], std::move(made[i])); });

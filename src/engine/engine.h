@@ -1,9 +1,9 @@
 // Many copies of one world in the caller's process, stepped together on all cores.
 //
 // The same code as in a server's run, and the same bytes: copy i with the seed s + i, given the
-// same commands at the same steps, produces the messages of `ruedo run --lockstep --seed s+i`. What
-// never moves is shared between copies. Pictures that nobody reads, by observe() or on_message(),
-// are not drawn. Not thread-safe: one thread at a time.
+// same commands at the same steps, produces the messages of `ruedo run --lockstep --seed s+i`.
+// Copies share static models. Pictures without a reader, by observe() or on_message(), are not
+// drawn. Not thread-safe: one thread at a time.
 #pragma once
 
 #include <atomic>
@@ -123,7 +123,7 @@ class Engine {
 
   // Called in step() and reset() with each message, in the order of copies and messages (of a long
   // step(), for each of its pieces); nothing is computed in parallel then. wants: the channels that
-  // it reads; without it, all.
+  // it reads; if empty, all.
   void on_message(MessageHandler handler, std::function<bool(const Channel&)> wants = {});
   // The same for each state, before its messages.
   void on_state(StateHandler handler) { state_handler_ = std::move(handler); }

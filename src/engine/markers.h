@@ -15,7 +15,7 @@ namespace ruedo::engine {
 // "" or what is wrong with it.
 std::string check_markers(const markers_t& markers);
 
-// What a client drew, from an encoded markers_t, or from the applied_t in which logs store it.
+// A client's drawing, from an encoded markers_t, or from the applied_t in which logs store it.
 // nullopt: it is neither, damaged, or no run would accept it.
 std::optional<markers_t> markers_in(std::span<const uint8_t> message);
 

@@ -54,7 +54,7 @@ Module::Slot Module::slot_of(const Device& device) const {
           device.visual_rays};
 }
 
-// From each device's due samples; every batch so far has been passed on and finished.
+// From each device's due samples; every earlier batch has been passed on and finished.
 void Module::count_due() {
   observes_ = false;
   to_hand_over_.clear();
@@ -160,7 +160,7 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
     to_sample_.pass(end - 1);
     return;
   }
-  if (!rays_ && !visual_rays_) {  // one thread, and nobody looks at the steps between samples
+  if (!rays_ && !visual_rays_) {  // one thread, and no device observes the steps between samples
     for (int64_t due = to_sample_.next(); due < end; due = to_sample_.next()) {
       const auto i = static_cast<int>(due - batch.first_step);
       if (i >= 0) process_pieces(batch, output, i, i + 1, left_off);

@@ -86,8 +86,8 @@ struct ModuleSetup {
   }
 };
 
-// What a module needs from the world to create its scenes, in its own thread. Entries that no
-// module needs may be empty.
+// The parts of the world from which a module creates its scenes, in its own thread. Entries that
+// no module needs may be empty.
 struct SceneMakers {
   std::function<std::unique_ptr<scene::RayScene>()> rays, visual_rays;
   std::function<std::unique_ptr<scene::Renderer>()> renderer;
@@ -119,7 +119,7 @@ class Module {
   // Lets its devices observe and sample the states of a batch, and writes their messages into
   // `output`. Batches come in order; left_off: once true, samples are no longer wanted.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
-  // Lets the device of a channel take the last sample that it skipped because nobody read it, if no
+  // Lets the device of a channel take the last sample that it skipped for lack of a reader, if no
   // later one was due; does nothing otherwise.
   void catch_up(int channel, Outbox& out);
   // Whether a sample is due before that step.

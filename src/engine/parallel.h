@@ -2,7 +2,7 @@
 //
 // No exception leaves a body: TBB would cancel the loop's other bodies, with what they build in
 // parallel themselves (Embree's trees), and does not survive that. Each body is called; then the
-// exception of the first piece that threw goes on.
+// exception of the first piece that threw is rethrown.
 //
 // TBB is not instrumented for the thread sanitizer, which would report every body as a race. Builds
 // with that sanitizer run the bodies in plain threads, so that real races between them are found.

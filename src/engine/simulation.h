@@ -64,7 +64,7 @@ class Simulation {
   bool over() const { return last_taken_; }
   const std::string& end() const { return end_; }
 
-  // What is being computed if next_batch() has nothing, in words: a sensor, or a step; "": nothing.
+  // The computation in progress if next_batch() has nothing: a sensor, or a step; "": none.
   // For the publisher.
   std::string at_work() const;
 
@@ -84,8 +84,8 @@ class Simulation {
   const physics::PhysicsWorld& physics() const { return world_.physics(); }
   robot::Robots& robots() { return world_.robots(); }
 
-  // ---- Changes of the world while it stands still: its pace holds, all batches are taken, every
-  // thread waits. What is written then becomes visible to the threads through the locks of the pace
+  // ---- Changes of the world while it stands still: its pace holds, all batches are read, every
+  // thread waits. Writes then become visible to the threads through the locks of the pace
   // and the modules' queues.
 
   // As in World. They also throw EnvironmentError if a module cannot run here; the world is then
@@ -96,7 +96,7 @@ class Simulation {
   void remove_model(InstanceIndex instance, Channels& channels);
   SimTime reset_time(int epoch) { return world_.reset_time(epoch); }
 
-  // Makes another copy of the world what this one is, but for commands that nobody applied yet.
+  // Copies this state to another copy of the world, without commands that are not applied yet.
   // Throws as World::take.
   void save(World& copy) const;
   // Writes it likewise. Throws as World::exchange.

@@ -34,8 +34,8 @@ class StaticScenes {
   std::shared_ptr<const scene::StaticRayScene> collisions_, visuals_;
 };
 
-// What is made once from a world's model: copies of a world share it, and none of them may then be
-// changed.
+// The parts made once from a world's model, which copies of a world share and must not
+// change.
 struct Plan {
   explicit Plan(const world::WorldModel& world) : model(world), layout(model) {}
   world::WorldModel model;

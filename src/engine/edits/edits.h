@@ -44,7 +44,7 @@ class ModelStore {
   std::map<std::string, Known> known_;
 };
 
-// The name, or with _2, _3, ... appended if it is taken: for a spawned model without a requested
+// The name, with _2, _3, ... appended if it exists: for a spawned model without a requested
 // name.
 std::string unused_name(const world::WorldModel& world, const std::string& name);
 
@@ -52,7 +52,7 @@ std::string unused_name(const world::WorldModel& world, const std::string& name)
 std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]);
 // "": valid for a model, as in a world file; a robot's name must also be usable in channel names.
 std::string fault_of_name(const std::string& name);
-// What can be checked before the model is read; OK: nothing is wrong.
+// The checks that need no model; OK: no error.
 Outcome check_spawn(const spawn_request_t& request);
 // step: the first state that shows it. name: is set to the model's name. findings: of its devices.
 Outcome spawn(const spawn_request_t& request, const world::LoadedModel& loaded, int64_t step,

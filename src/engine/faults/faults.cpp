@@ -333,7 +333,7 @@ void Faults::remove(RobotIndex robot) {
     late_bytes_ -= one.bytes;
     return true;
   });
-  // Another robot in its place begins anew, with wheels that have not turned.
+  // Another robot in its place has a fresh state, with wheels that have not turned.
   draws_.resize(layout_->robots.size());
   draws_[robot] = 0;
   std::erase_if(warned_, [&](const auto& one) { return one.first == robot; });

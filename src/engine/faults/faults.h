@@ -1,9 +1,9 @@
-// What goes wrong with the robots of a world, and when: from its file, and from messages on
+// The faults of a world's robots and their times: from its file, and from messages on
 // ROBOT/fault.
 //
 // For the simulation thread. Sensor faults travel with the batches to the modules
-// (sensor_faults.h); faults of wheels and commands act here, on what the drives are commanded and
-// on the wheel angles that encoders see.
+// (sensor_faults.h); faults of wheels and commands act here, on the commands of drives and on the
+// wheel angles of encoders.
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,7 @@ class Faults {
   Faults(const world::WorldModel& world, const world::BodyLayout& layout,
          const std::vector<device_info_t>& devices, uint64_t seed);
 
-  // What is wrong with a fault of that robot, or "".
+  // The error in a fault of that robot, or "".
   std::string check(const world::Fault& fault, RobotIndex robot) const;
   // Acts on the state `step`: samples of later states show it. An invalid one changes nothing.
   void begin(const world::Fault& fault, RobotIndex robot, int64_t step);
@@ -59,7 +59,7 @@ class Faults {
   // For the modules; null if there are none.
   const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
 
-  // Whether nothing has ever gone wrong, and no seed changed: then there is no state.
+  // Whether no fault has ever acted, and no seed changed: then there is no state.
   bool none() const { return !ever_; }
 
   void remove(RobotIndex robot);

@@ -132,7 +132,7 @@ void Judge::see(const Snapshot& snapshot) {
   if (distances_) see_clearance(snapshot);
 }
 
-// What falls touches nothing, and may pass over a goal.
+// A falling robot touches nothing, and may pass over a goal.
 void Judge::see_fall(SimTime time, const RobotState& robot) {
   const double up = (robot.X_WBase.rotation * robot.twist.linear).z();
   if (up > -kFall_m_s) return;
@@ -171,7 +171,7 @@ void Judge::see_contacts(const Snapshot& snapshot) {
     if (!own_.has(contact.link_a) || !own_.has(contact.link_b)) continue;
     const bool a = own_[contact.link_a], b = own_[contact.link_b];
     if (a == b) continue;
-    // What carries it presses upwards, low on the robot: as physics::Distances has it.
+    // The ground presses upwards, low on the robot, as in physics::Distances.
     if (std::abs(contact.normal.dot(up)) > 0.7 &&
         (contact.position - X_WBase.translation).dot(up) < 0.02)
       continue;
@@ -192,7 +192,7 @@ void Judge::see(const std::string& channel, std::span<const uint8_t> message) {
     odometry_.see(odometry);
 }
 
-// What the robot did not do by itself is no evidence of what it can do.
+// A motion by a request is not evidence of the robot's own ability.
 void Judge::see(const applied_t& applied) {
   constexpr std::string_view kFault = "/fault";
   if (applied.channel.ends_with(kFault))
@@ -299,7 +299,7 @@ void Judge::add_goals(Verdict& verdict) const {
   }
 }
 
-// What has to hold at each step.
+// The conditions of each step.
 void Judge::add_kept(Verdict& verdict, const std::string& what, const std::string& evidence) const {
   const auto failed = std::find_if(failures_.begin(), failures_.end(),
                                    [&](const Check& check) { return check.what == what; });

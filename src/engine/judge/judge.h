@@ -51,7 +51,7 @@ class Judge {
   Judge(std::shared_ptr<const world::WorldModel> world, Expectations expected);
   ~Judge();
 
-  // Models have come or gone, or the world begins anew. The layout is that of the states to come.
+  // Models were added or removed, or the world was reset. The layout is that of the next states.
   void see_world(std::shared_ptr<const world::WorldModel> world, const world::BodyLayout& layout);
 
   void see(const Snapshot& snapshot);

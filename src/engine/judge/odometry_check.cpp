@@ -1,4 +1,4 @@
-// The frame of odometry begins where the robot does, and anew at each reset of the odometry.
+// The frame of odometry starts at the robot's pose, and again at each reset of the odometry.
 #include "engine/judge/odometry_check.h"
 
 #include <algorithm>

@@ -17,7 +17,7 @@ namespace ruedo::judge {
 class OdometryCheck {
  public:
   // base_link at that time, and how often the odometry was reset by then. A time that is not after
-  // the last one begins anew: sim time was reset.
+  // the last one restarts the check: sim time was reset.
   void see_truth(SimTime time, const Pose& X_WBase, int32_t resets);
   void see(const odometry_t& sample);
 

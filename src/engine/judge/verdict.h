@@ -1,7 +1,7 @@
-// A verdict: what was asked of a run, and what came of each, with the evidence.
+// A verdict: the expectations of a run, and the outcome of each, with the evidence.
 //
 // It is made of evidence, not of the absence of objections: a run has passed when each check was
-// judged and held, and says on what. What could not be judged has not passed. `ruedo regress`,
+// judged and held, with its evidence. A check that was not judged has not passed. `ruedo regress`,
 // campaigns and the engine of Python all make one of these.
 #pragma once
 
@@ -41,8 +41,8 @@ struct Verdict {
 
   // Not without a check.
   bool passed() const;
-  // What has not passed: first what has no moment, then the earliest; what failed before what was
-  // not judged.
+  // The checks that have not passed: first those without a time, then the earliest; failed ones
+  // before those that were not judged.
   std::vector<Check> failures() const;
   // "12000 steps; the client ended with 0 at 59.8 s; clearance 0.31 m over 12000 steps".
   std::string evidence() const;
