@@ -1,10 +1,10 @@
-// Back-pressure from the program that launched the run: the run waits for it, rather than leave it
+// Back-pressure from the program that launched the run: the run waits for it instead of leaving it
 // behind.
 //
-// The program says how far it has come, in sim time. The run goes at most kMostAhead further, half
-// of it where the program works with what it knows, or one step where that is longer; and it has at
-// most kMostBytes of samples on the way to the program. Until the first such word the run waits for
-// nobody.
+// The program reports its progress in sim time. The run advances at most kMostAhead further, half
+// of it while the program is using a sample, or one step if that is longer; and it has at most
+// kMostBytes of samples on the way to the program. Before the first report the run does not
+// wait.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ struct LauncherProgress {
   int32_t epoch = 0;
   // All samples up to here have come, and its callbacks have seen them.
   SimTime received_us = 0;
-  // It works with what it knew then, and has not asked for more yet: a run at the highest rate
+  // It is using samples of that time, and has not requested newer ones: a run at the highest rate
   // waits for that, too. The largest number: it waits for samples.
   SimTime used_us = std::numeric_limits<SimTime>::max();
 };
@@ -45,10 +45,10 @@ class Backpressure {
 
   explicit Backpressure(int64_t step_us) : step_us_(step_us) {}
 
-  // Any thread, as all that follows. What is of another epoch is ignored.
+  // Any thread, as all that follows. Reports of another epoch are ignored.
   void note_progress(const LauncherProgress& progress);
-  void end();  // nobody is waited for any more
-  // The run goes on from there.
+  void end();  // the run waits no longer
+  // The run continues from there.
   void begin(int32_t epoch, SimTime time_us);
   Limits limits() const;
   bool acts() const { return acts_; }  // the program has said something; asked at each step

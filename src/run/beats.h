@@ -1,7 +1,7 @@
-// What a run says at fixed rates of sim time: ticks, ruedo/info, hashes of the state for logs, and
+// The messages of a run at fixed rates of sim time: ticks, ruedo/info, hashes of the state, and
 // warnings on the terminal.
 //
-// Each is a sink that speaks at the end of a step.
+// Each is a sink that publishes at the end of a step.
 #pragma once
 
 #include <chrono>
@@ -26,7 +26,7 @@ class Beat {
 
  private:
   SampleClock clock_;
-  int64_t last_ = -1, next_ = 0;  // steps: that was asked for, that is the first due at or after it
+  int64_t last_ = -1, next_ = 0;  // steps: the requested one, the first due at or after it
 };
 
 // ruedo/tick, with the list of the step's messages.

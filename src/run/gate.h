@@ -1,5 +1,5 @@
-// What holds a run back: no state after the limit is computed. The pacer is one; tests of the modes
-// bring their own.
+// The limit of a run: no state after it is computed. The pacer is one; tests of the modes have
+// their own.
 #pragma once
 
 #include <cstdint>

@@ -45,7 +45,7 @@ class PartOfFile {
   PartOfFile(const PartOfFile&) = delete;
   PartOfFile& operator=(const PartOfFile&) = delete;
   const std::string& path() const { return path_; }
-  // Renames it to its own name; it is on the disk before this returns. What went wrong, or "".
+  // Renames it to its own name; it is on the disk before this returns. Returns the error, or "".
   std::string keep_as(const std::string& path) {
     std::string fault = synced(path_, O_RDONLY);
     if (fault.empty() && ::rename(path_.c_str(), path.c_str()) != 0) fault = std::strerror(errno);

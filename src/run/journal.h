@@ -1,6 +1,6 @@
-// What acted on the world since its epoch began, from which snapshots are made.
+// The inputs of the world since its epoch began, from which snapshots are made.
 //
-// A file without a name in the snapshots' folder: it grows with what acts on the world and with
+// A file without a name in the snapshots' folder: it grows with inputs of the world and with
 // nothing else, and is reset with the world.
 #pragma once
 
@@ -55,7 +55,7 @@ class Journal : public Sink {
   // of that state.
   std::string save_past(const std::string& name, int64_t step, SimTime time_us, int32_t epoch,
                         SimTime stamp_us);
-  // The file of a snapshot; "" for a name that is none: 1 to 63 of letters, digits, '_', '-' and
+  // The file of a snapshot; "" for an invalid name: 1 to 63 of letters, digits, '_', '-' and
   // '.', not first a '.'.
   std::string snapshot_path(const std::string& name) const;
 

@@ -1,4 +1,4 @@
-// A run that goes on by itself, paced by real time alone, or by messages that it waits for
+// A run that advances by itself, paced by real time alone, or by messages that it waits for
 // (--wait-for).
 #pragma once
 

@@ -1,8 +1,8 @@
-// How a run goes on: by itself (Live), by what its clients grant (Lockstep), or by what is in a log
-// (Repeating).
+// The mode in which a run advances: by itself (Live), by its clients' grants (Lockstep), or by a
+// log (Repeating).
 //
-// The run asks its mode whether it may go on, tells it what was published, and asks when it wants
-// to be called again. States, requests and messages are the same in all modes. The
+// The run asks its mode whether it may continue, passes it the published steps, and asks when to
+// call it again. States, requests and messages are the same in all modes. The
 // publisher's thread calls everything here; on_message() comes from any thread, never beside
 // begin() or attend().
 #pragma once
@@ -40,14 +40,14 @@ class Mode {
       return std::string();
     };
   };
-  // What the run has to do before it goes on.
+  // The tasks of the run before it continues.
   struct Turn {
     enum class What { nothing, execute, change_mode, end };
     What what = What::nothing;
     request_t request{};  // to execute
   };
   struct Attended {
-    Time next = Time::max();       // when attend() wants to be called again, at the latest
+    Time next = Time::max();       // when to call attend() again, at the latest
     std::vector<int64_t> dropped;  // sessions that have ended
   };
 
@@ -55,13 +55,13 @@ class Mode {
 
   // ---- May it go on?
 
-  // The run goes on from the state `step` of that world; -1: from its beginning. Throws InputError.
+  // The run continues from the state `step` of that world; -1: from the start. Throws InputError.
   virtual void begin(const Stage& stage, int64_t step) = 0;
   // Models have come or gone at the state `step` of the world that runs.
   virtual void models_changed(const Stage& stage, int64_t step) {
     static_cast<void>(stage), static_cast<void>(step);
   }
-  // False while a reader has to catch up with what was published: no batch is taken.
+  // False while a reader must catch up with published messages: no batch is taken.
   virtual bool has_room() const { return true; }
   // Clients say how far it goes: every step has its tick, and the publisher computes a few steps
   // itself.
@@ -76,7 +76,7 @@ class Mode {
   // Whether the first state comes by itself.
   virtual bool state_comes() const { return true; }
 
-  // ---- What was published
+  // ---- Published steps
 
   // All states up to this one, with their ticks.
   virtual void published(int64_t step) { static_cast<void>(step); }

@@ -77,7 +77,7 @@ int Pacer::wait(int64_t& step, int limit) {
     int64_t count =
         std::min<int64_t>(limit - 1, until - step) + 1;  // until may be the largest number there is
     if (limit_ < INT64_MAX || until < until_) count = std::min(count, some_of(until - step + 1));
-    if (std::isfinite(rate_) && !paused_) {  // single steps are taken at once
+    if (std::isfinite(rate_) && !paused_) {  // single steps are computed at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);
       if (now < due_now) {

@@ -44,9 +44,9 @@ class Pacer : public engine::Pace, public Gate {
   int64_t allow(int64_t steps);  // while paused: that many more; returns the last one of them
   void set_rate(double rate);
   void set_limit(int64_t step) override;
-  void set_limit_quietly(int64_t step) override;        // for who calls borrow() next
+  void set_limit_quietly(int64_t step) override;        // for the next call of borrow()
   void set_limits(const Backpressure::Limits& limits);  // beside that of set_limit(), and quietly
-  void look_again();  // for who waits at a limit that was set quietly
+  void look_again();  // wakes a thread that waits at a limit that was set quietly
 
   // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last
   // state that it let go. wait_until_held(), when that state is done: until the simulation thread

@@ -28,7 +28,7 @@ class Publisher {
   void announce(Announcement announcement);
   // Sim time was reset to 0, and no state was published yet. Stamps go on.
   void begin_epoch(int32_t epoch);
-  // Then: it goes on from a state of another epoch, whose messages had these sequences().
+  // Then: it continues from a state of another epoch, whose messages had these sequences().
   void go_on_from(const Snapshot& state, const std::vector<int64_t>& sequences);
   const std::vector<int64_t>& sequences() const { return sequences_; }
 
@@ -51,7 +51,7 @@ class Publisher {
 
   void flush();
 
-  // By channel: whether any sink wants its samples, be they muted now or not.
+  // By channel: whether any sink reads its samples, be they muted now or not.
   engine::ReadChannels read() const;
   // Grows whenever read() may be another.
   uint64_t audience() const;

@@ -32,8 +32,8 @@ class QueuedSink : public Sink {
     std::chrono::milliseconds latency{0};  // that a message may wait for others to travel with
   };
 
-  // The sink must outlive it, and is called from the queue's thread alone, but for hears(), wants()
-  // and audience().
+  // The sink must outlive it, and is called from the queue's thread only, except for hears(),
+  // wants() and audience().
   QueuedSink(Sink& sink, Options options);
   ~QueuedSink() override;  // delivers what is queued, then ends the thread
 
@@ -46,7 +46,7 @@ class QueuedSink : public Sink {
   void end_step(const Step& step) override;
   void flush() override;
 
-  // Returns when the sink has received and flushed everything so far.
+  // Returns when the sink has received and flushed all earlier messages.
   void drain();
 
   // Whether the run waits for the sink at this moment. Any thread, as the next.

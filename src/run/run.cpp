@@ -100,7 +100,7 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
 
 Run::~Run() { bus_.stop(); }
 
-// Not before run(): who refuses the run until then leaves the log of an earlier one as it is.
+// Not before run(): a refusal of the run until then leaves the log of an earlier one as it is.
 void Run::begin_log() {
   if (!header_made_) return;
   if (log_)
@@ -197,7 +197,7 @@ void Run::publish_what_is_ready() {
   }
 }
 
-// A tick says what has been published: whoever has it has the samples before it.
+// A tick lists the published samples: a client that has it has the samples before it.
 bool Run::has_room() {
   if (!mode().has_room()) return false;
   if (backpressure_.has_room()) return true;

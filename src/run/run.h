@@ -2,8 +2,8 @@
 //
 // run() is the publisher: it takes finished batches in order, hands their messages to the sinks,
 // executes requests between batches, and ends when the run does. Everything goes out from its
-// thread, in one order. The mode (mode.h) decides when it goes on, the sinks (sink.h) take the
-// messages, and the table in requests/requests.cpp says what each request does.
+// thread, in one order. The mode (mode.h) decides when it advances, the sinks (sink.h) take the
+// messages, and the table in requests/requests.cpp has the function of each request.
 #pragma once
 
 #include <atomic>
@@ -50,7 +50,7 @@ struct RunOptions {
   int64_t duration_us = -1;  // sim time; -1: without end
   bool paused = false;
   bool control = true;       // serve ruedo/request
-  LockstepOptions lockstep;  // wants control
+  LockstepOptions lockstep;  // needs control
   std::string record;        // file; "": none
   int64_t record_limit = 0;  // bytes of all files that --record makes; 0: none
   bool edited = false;       // keeps the models' text, for editors of the world
@@ -68,7 +68,7 @@ struct RunOptions {
   std::vector<std::pair<std::string, std::string>> remaps;
 };
 
-// What has gone on so far, for a status line.
+// The progress of the run, for a status line.
 struct Status {
   int64_t step = -1;
   SimTime time_us = 0;
@@ -113,7 +113,7 @@ class Run {
   const engine::Channels& channels() const { return channels_; }
   // The description of the world for clients; valid until models come or go.
   const std::vector<world_info_t>& info() const { return publisher_.announcement().info; }
-  // What a log of this run begins with; empty where nothing records, watches or repeats it.
+  // The header of a log of this run; empty if nothing records, watches or repeats it.
   const log_header_t& log_header() const { return header_; }
   const Findings& findings() const { return findings_; }
   // The first error in what it is made of: in its devices, or in a model that came later.
@@ -154,7 +154,7 @@ class Run {
   void publish(const engine::Batch& batch);
   void record_applied(const engine::Batch& batch, int64_t step);
   void tell_readers();  // what is read by now
-  bool compute_here();  // a few steps that were granted; false: there are none
+  bool compute_here();  // a few granted steps; false without one
   void serve();         // requests, and models that are ready
   Clock::time_point attend_follower(Clock::time_point now);
   Clock::time_point attend();  // does what is due by real time; returns when it is due next
@@ -174,7 +174,7 @@ class Run {
     bool paused;
   };
   void make_simulation(const Pace& pace);
-  // The run goes on with that mode from the state `step`; -1: from its beginning. With the
+  // The run continues in that mode from the state `step`; -1: from its beginning. With the
   // simulation's mutex held, as the next.
   void begin_mode(Mode& mode, int64_t step);
   void limit_pace();
@@ -184,7 +184,7 @@ class Run {
   Mode& mode() { return repeating_ ? static_cast<Mode&>(*repeating_) : *mode_; }
   const Mode& mode() const { return repeating_ ? static_cast<const Mode&>(*repeating_) : *mode_; }
   void begin_repeat(std::unique_ptr<Repeating> repeating);
-  void take_turn();          // what the mode wants done at this state
+  void take_turn();          // the mode's tasks at this state
   std::string take_turns();  // why what is repeated broke off; "": it did not
   void end_repeat(bool paused);
   void break_repeat_off();  // the world stays where it is, paused
@@ -247,7 +247,7 @@ class Run {
   Outcome set_twist(const request_t& request, const set_twist_request_t& body);
   Outcome save(const request_t&);
 
-  // What is published at fixed rates of sim time.
+  // Messages at fixed rates of sim time.
   struct Beats {
     HashBeat hashes;
     WatchdogWarnings watchdogs;
@@ -271,28 +271,28 @@ class Run {
   engine::Wakeup wakeup_;  // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
 
-  // How it goes on.
+  // Its mode.
   std::mutex
       simulation_mutex_;  // of the world and the mode: commands reach them from other threads
   std::unique_ptr<Pacer> pacer_;
   Backpressure backpressure_;
   std::unique_ptr<engine::Simulation> simulation_;
   const std::unique_ptr<Mode> mode_;
-  std::unique_ptr<Repeating> repeating_;  // before that mode goes on; null: nothing is repeated
+  std::unique_ptr<Repeating> repeating_;  // before that mode; null: nothing is repeated
   Pace wanted_;                           // by the clients, once nothing is repeated
 
-  // What it publishes, and to whom.
+  // Its output.
   Publisher publisher_;
-  uint64_t audience_ = UINT64_MAX;  // of the publisher, when the simulation was told what is read
+  uint64_t audience_ = UINT64_MAX;  // of the publisher, at the last update of read channels
   BusSink bus_sink_;
   std::unique_ptr<LogSink> log_;  // null: none, as the next two
   std::unique_ptr<WatcherSink> watcher_;
   std::unique_ptr<Journal> journal_;
   Beats beats_;
   log_header_t header_;       // of this epoch
-  bool header_made_ = false;  // those who only look on (ROS 2, Foxglove) come later, and need none
+  bool header_made_ = false;  // mere viewers (ROS 2, Foxglove) come later, and need none
 
-  // What SNAPSHOT keeps beside its files.
+  // The memory of SNAPSHOT, beside its files.
   SavedStates saved_states_;
   std::shared_ptr<engine::Plan> plan_of_saved_;  // of their worlds
 
@@ -302,7 +302,7 @@ class Run {
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
-  // What requests change.
+  // State that requests change.
   Snapshot changed_;                     // the last state, after requests
   std::unique_ptr<EditedWorld> edited_;  // null: it is not edited
   engine::ModelStore models_{first_world_->file};

@@ -13,7 +13,7 @@
 namespace ruedo::run {
 
 // Makes everything that has a state. A repetition runs as fast as possible, whatever rate the
-// clients want.
+// clients set.
 void Run::make_world() {
   if (!repeating_ && pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
   const Pace pace = repeating_ ? Pace{std::numeric_limits<double>::infinity(), false} : wanted_;
@@ -65,7 +65,7 @@ void Run::note_progress(const LauncherProgress& progress) {
   if (!backpressure_.acts()) bus_.keep_all_for_launcher();
   backpressure_.note_progress(progress);
   limit_pace();
-  wakeup_.set();  // the publisher goes on, or wakes who does
+  wakeup_.set();  // the publisher continues, or wakes the thread that does
 }
 
 void Run::follow_nobody() {
@@ -76,7 +76,7 @@ void Run::follow_nobody() {
   wakeup_.set();
 }
 
-// What is repeated is not published, and nobody has to follow it.
+// A repetition is not published, and no client needs to follow it.
 void Run::limit_pace() {
   pacer_->set_limits(repeating_ ? Backpressure::Limits{} : backpressure_.limits());
 }
@@ -154,7 +154,7 @@ void Run::take_turn() {
   }
 }
 
-// What was read ahead of it does not act any more.
+// Inputs that were read ahead of it do not act any more.
 void Run::break_repeat_off() {
   simulation_->inbox().clear();
   end_repeat(true);

@@ -1,9 +1,9 @@
-// Where the messages of a run go: the bus, a log, a watcher, another middleware.
+// A receiver of a run's messages: the bus, a log, a watcher, another middleware.
 //
 // The publisher calls every sink from its own thread, in one order: announce(), then for each state
-// begin_step(), its messages in the order of the schedule, and end_step(). No sink may throw, hold
-// up the run, or change what the others get: one that may be slow works behind a QueuedSink, in a
-// thread of its own. docs/architecture.md says how a sink is added.
+// begin_step(), its messages in the order of the schedule, and end_step(). No sink may throw,
+// delay the run, or change the messages of others: one that may be slow works behind a QueuedSink,
+// in a thread of its own. docs/architecture.md says how a sink is added.
 #pragma once
 
 #include <cstddef>
@@ -25,11 +25,11 @@ enum class Kind {
   service,  // ticks, ruedo/info and replies: of this run alone, and in no log
 };
 
-// A message. What it refers to is valid during the call.
+// A message. Its data is valid during the call.
 struct Published {
   Kind kind;
   SimTime time_us;             // sim time in this epoch
-  SimTime stamp_us;            // the same for logs: it goes on when sim time is reset
+  SimTime stamp_us;            // the same for logs: it continues when sim time is reset
   const std::string& channel;  // as it is called on the bus
   engine::ChannelIndex index;  // in Announcement::channels; none: a record
   int64_t sequence;            // number on its channel in this epoch, from 0; of a tick: its part
@@ -43,7 +43,7 @@ struct Step {
   int32_t epoch;
 };
 
-// What there is in the run from now on.
+// The contents of the run from now on.
 struct Announcement {
   engine::Channels channels;
   engine::SimulationChannels own;  // their indices
@@ -63,8 +63,8 @@ class Sink {
   // Does not change.
   virtual Hears hears() const { return {}; }
 
-  // Whether it wants the samples of that channel. Pictures that no sink wants are not drawn: then
-  // message() does not bring them. The publisher's thread, as the next.
+  // Whether it reads the samples of that channel. Pictures that no sink reads are not drawn: then
+  // message() does not get them. The publisher's thread, as the next.
   virtual bool wants(const std::string& channel) const {
     static_cast<void>(channel);
     return true;
@@ -80,7 +80,7 @@ class Sink {
   virtual void message(const Published& message) = 0;
   virtual void end_step(const Step& step) { static_cast<void>(step); }
 
-  // Sends off what has come so far: called after each batch of steps, and when there is nothing
+  // Sends off the messages until now: called after each batch of steps, and when there is nothing
   // else to do.
   virtual void flush() {}
 };

@@ -1,4 +1,4 @@
-// The bus follows the announcements; the log tells its faults across threads.
+// The bus follows the announcements; the log reports its faults across threads.
 #include "run/sinks.h"
 
 #include <utility>

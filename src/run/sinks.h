@@ -16,7 +16,7 @@
 
 namespace ruedo::run {
 
-// What clients hear, and the channels on which they are heard.
+// The bus: the channels for clients, and the channels of their messages.
 class BusSink : public Sink {
  public:
   // conflates: a client that falls behind gets the newest sample of each channel; else every one.
@@ -64,7 +64,7 @@ class LogSink : public Sink {
 
   // Whether the run waits for the disk. Any thread.
   bool waits() const { return queue_.is_waited_for(); }
-  // Returns when all that came so far was handed to the operating system.
+  // Returns when all earlier messages were handed to the operating system.
   void drain() { queue_.drain(); }
   // After drain(), at the end of the run: check() then knows of a file that has gone.
   void look_for_file() { file_.look_for_file(); }

@@ -53,7 +53,7 @@ void StallWatch::say(const std::string& reason, Clock::time_point now) {
 
 std::string StallWatch::reason(At at) {
   switch (at) {
-    case At::rest: return "";  // idle() tells
+    case At::rest: return "";  // idle() reports
     case At::steps: return "a step is being computed";
     case At::messages: return host_.takes_none();
     case At::request: return "a request is being executed: " + request_;

@@ -1,10 +1,10 @@
-// Says within two seconds why a run does not go on, once for each time that it stands.
+// Reports within two seconds why a run does not advance, once for each stop.
 //
 // While the publisher has nothing to do it asks for the reason itself: a client, a sensor, a step.
 // When the publisher itself is blocked, by a request or a disk, a thread of the watch notices that
 // its beats have stopped, and reports it; likewise when the whole process was stopped. That thread
-// does all the telling, and holds nothing up meanwhile: standard error may be a pipe that nobody
-// reads.
+// prints all reports, and delays nothing meanwhile: standard error may be a pipe without a
+// reader.
 #pragma once
 
 #include <atomic>
@@ -47,9 +47,9 @@ class StallWatch {
   }
   // It begins with a request that may take long: "SPAWN of 'planner'".
   void beat(std::string request);
-  // A state was published, or the run stands because a client wants it to.
+  // A state was published, or the run stands because a client paused it.
   void moved(Clock::time_point now);
-  // It has nothing to do. why: who or what is waited for; "" when it need not be said.
+  // It has nothing to do. why: the client or thing that it waits for; "" if no report is needed.
   void idle(Clock::time_point now, const std::function<std::string()>& why);
 
  private:

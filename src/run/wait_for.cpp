@@ -14,7 +14,7 @@
 namespace ruedo::run {
 namespace {
 
-// Where commands on a channel go, by its own name or the one on the bus; none: it is no input now.
+// The input of a channel, by its own name or the one on the bus; none if it is not an input now.
 engine::InputIndex find_input(const std::string& name, const engine::Channels& channels,
                               const engine::CommandInbox& inbox) {
   for (const engine::Channel& channel : channels.list()) {

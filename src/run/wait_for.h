@@ -29,7 +29,7 @@ class WaitFor {
   WaitFor(std::vector<WaitForOption> options, int64_t step_us);
 
   // For a simulation that was rebuilt, or is at `step` for another reason. The first time it throws
-  // InputError for what is no input.
+  // InputError for a channel that is not an input.
   void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
               int64_t step);
 
@@ -39,7 +39,7 @@ class WaitFor {
   // False: another channel.
   bool on_message(const std::string& channel, const uint8_t* data, size_t size);
 
-  // What has to come before the state after `step` can be computed, in words; "": nothing.
+  // The missing message before the state after `step` can be computed, in words; "": none.
   std::string waits_for(int64_t step) const;
 
  private:

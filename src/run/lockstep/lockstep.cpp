@@ -248,7 +248,7 @@ void Lockstep::advance() {
   if (until <= limit_) return;
   schedule(until);
   limit_ = until;
-  gate_->set_limit_quietly(limit_);  // the publisher goes on from here
+  gate_->set_limit_quietly(limit_);  // the publisher continues from here
 }
 
 // Commands of one step go in the order of the clients' names, each client's in the order of its

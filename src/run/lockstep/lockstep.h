@@ -1,8 +1,8 @@
 // Lockstep: the run goes as far as its clients have granted, with the commands that came with their
 // grants.
 //
-// Here is who takes part and how far each has granted, the commands for steps to come, the messages
-// that not all have received yet, and the leases. What it decides goes to the gate and the inbox.
+// It keeps the participants and their grants, the commands for later steps, the messages that not
+// all have received yet, and the leases. Its decisions go to the gate and the inbox.
 #pragma once
 
 #include <chrono>
@@ -31,7 +31,7 @@ class LeaseEnded : public std::runtime_error {
 struct LockstepOptions {
   enum class Policy {
     pause,  // the run waits until the client is heard again, or another takes its place by its name
-    drop,   // the run goes on without it
+    drop,   // the run continues without it
     fail,   // the run ends with LeaseEnded
   };
   int clients = 0;        // that step 0 waits for; 0: no lockstep

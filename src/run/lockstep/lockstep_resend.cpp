@@ -13,7 +13,7 @@
 namespace ruedo::run {
 namespace {
 
-// What a reply and each of its parts take beside the text and the data.
+// The overhead of a reply and of each of its parts, beside the text and the data.
 constexpr size_t kReplyHead = 8 + 8 + 4 + 1 + 4, kPartHead = 8 + 4 + 8 + 4 + 4 + 4;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// What ran at each moment of a log: its world, as requests changed it, and the ruedo/info that a
-// log has not.
+// The run at each time of a log: its world, as requests changed it, and the ruedo/info that a log
+// lacks.
 #pragma once
 
 #include <cstdint>

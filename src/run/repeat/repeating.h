@@ -17,11 +17,11 @@ namespace ruedo::run {
 
 class Repeating : public Mode {
  public:
-  // after: the mode in which the run goes on; null: the run ends with the log. Throws InputError
-  // for what is no log, and for one that breaks off where the run is to go on.
+  // after: the mode in which the run continues; null: the run ends with the log. Throws InputError
+  // if the file is not a log, or is truncated and the run shall continue.
   Repeating(const std::string& path, const Mode* after);
 
-  // How many steps that takes; known where the run goes on afterwards.
+  // The number of steps; known if the run continues afterwards.
   int64_t steps() const { return length_.steps; }
   const log_header_t& header() const { return replay_.header(); }
   const std::string& path() const { return replay_.path(); }
@@ -41,7 +41,7 @@ class Repeating : public Mode {
 
   Replay replay_;
   const Mode* after_;
-  Length length_;                     // where the run goes on afterwards
+  Length length_;                     // if the run continues afterwards
   std::optional<Progress> progress_;  // as length_
   int64_t before_ = 0, last_ = -1;    // steps before sim time was reset, and the last one since
   Stage stage_;

@@ -21,7 +21,7 @@ namespace ruedo::run {
 
 class Replay {
  public:
-  // What the epoch that runs now is driven by.
+  // The input of the current epoch.
   struct Target {
     engine::CommandInbox& inbox;
     Gate& gate;
@@ -32,15 +32,15 @@ class Replay {
                        // set to 0
   };
 
-  // Throws InputError for a file that is no log, or does not begin with the header of a run.
+  // Throws InputError for a file that is not a log, or does not begin with the header of a run.
   explicit Replay(const std::string& path);
 
   const log_header_t& header() const { return header_; }
   const std::string& path() const { return reader_.path(); }
 
   // To be called when state `step` is out, or none is yet (-1). Returns a request that acts on that
-  // state: execute it, then call executed(), then this again. Null: the run goes on, or is at its
-  // end. Throws InputError for a log that does not fit what runs.
+  // state: execute it, then call executed(), then this again. Null: the run continues, or is at its
+  // end. Throws InputError for a log that does not match the run.
   const applied_t* advance(int64_t step, const Target& target);
   void executed();
   const applied_t& applied() const { return applied_; }  // that advance() returned

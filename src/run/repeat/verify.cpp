@@ -95,7 +95,7 @@ class Verifier::Impl {
   std::vector<std::string> differences;
 
  private:
-  // What acted is the input of the repetition; the header describes the machine.
+  // Inputs come from the log itself; the header describes the machine.
   bool is_compared(const std::string& channel) const {
     return channel != kAppliedChannel && channel != kHeaderChannel &&
            (kept_.empty() || kept_.contains(channel));

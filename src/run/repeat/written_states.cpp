@@ -20,8 +20,8 @@
 namespace ruedo::run {
 namespace {
 
-// What the bytes of a state hold for, beside the seed: this build on such a machine, with this
-// world and these options. "" for a program without a build's id.
+// The conditions under which a state's bytes are valid, beside the seed: this build on such a
+// machine, with this world and these options. "" for a program without a build's id.
 std::string made_for(const log_header_t& header) {
   if (header.version.find(", build ") == std::string::npos) return "";
   std::string all = header.version + '\n' + header.cpu + '\n' + header.libc + '\n' +

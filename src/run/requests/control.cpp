@@ -25,7 +25,7 @@ bool Control::on_request(const uint8_t* data, size_t size) {
     ++refused_;
     return false;
   }
-  if (size > kMaxRequestSize) {  // refused for its size, which stays to be told
+  if (size > kMaxRequestSize) {  // refused for its size, which the reply gives
     request.body = {};
     size = 0;
   }
@@ -201,7 +201,7 @@ void Control::drop(int64_t session) {
   forget_left();
 }
 
-// Each session has its share of what waits, and whoever leaves may join again.
+// Each session has its share of the waiting requests, and a client that leaves may join again.
 void Control::forget_left() {
   const auto left = [&](int64_t session) { return sessions_.find(session) == nullptr; };
   std::erase_if(held_, [&](const request_t& held) { return left(held.session); });

@@ -1,7 +1,7 @@
 // Simulation control: requests in, each executed once, replies out.
 //
 // The bus's thread puts requests into a bounded inbox; the publisher executes them between batches.
-// The server says what a request does. This file checks who may ask, and that no request is
+// The server executes a request. This file checks the client's permission, and that no request is
 // executed twice.
 #pragma once
 

@@ -37,7 +37,7 @@ bool is_there(const std::string& path) {
   return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
 }
 
-// What went wrong, or "". The old file stays intact until the new one is complete.
+// Returns the error, or "". The old file stays intact until the new one is complete.
 std::string write_file(const std::string& path, const std::string& bytes) {
   const fs::path folder = fs::path(path).parent_path();
   const std::string part =

@@ -21,7 +21,7 @@ class EditedWorld {
   // file: what save() writes; "": nothing. The world as it was loaded must outlive it.
   EditedWorld(const world::WorldModel& first, std::string file);
 
-  // The run tells what requests have done.
+  // The run reports the effects of requests.
   void begin(std::set<std::string> put = {});  // the world is rebuilt; what put() was then
   void spawned(const std::string& name, const spawn_request_t& body);
   void put(const std::string& name);
@@ -29,7 +29,7 @@ class EditedWorld {
 
   std::set<std::string> put() const;  // that were put somewhere
   bool saves() const { return !file_.empty(); }
-  // SDF or URDF of a model, as SPAWN takes it; "" where there is none. Any thread.
+  // SDF or URDF of a model, for SPAWN; "" without one. Any thread.
   std::string model_text(const std::string& name) const;
 
   struct Saved {
@@ -51,8 +51,8 @@ class EditedWorld {
   const world::WorldModel& first_;
   const std::string file_;
   std::string source_;                              // the text that the world was loaded from
-  std::string fault_;                               // why there is none
-  std::optional<std::string> known_;                // what the file holds; none: there is none
+  std::string fault_;                               // why it has no text
+  std::optional<std::string> known_;                // the file's content; nothing without a file
   mutable std::unique_ptr<world::WorldText> text_;  // made on first use
   mutable std::mutex mutex_;                        // of that, and of what follows
   std::map<std::string, std::string> spawned_;      // texts, by name

@@ -1,9 +1,9 @@
-// Where the models of SPAWN requests are made ready: read, checked, their meshes imported, in a
+// Prepares the models of SPAWN requests: reads and checks them, and imports their meshes, in a
 // thread beside the run.
 //
 // One after the other, in the order of the requests, each under a budget of time and memory, and
-// none before the one before it was taken. What is ready is put in by the publisher, between two
-// steps.
+// none before the previous one was added. The publisher adds finished models to the world between
+// two steps.
 #pragma once
 
 #include <condition_variable>

@@ -1,9 +1,9 @@
-// What is known of each kind of request: whether this server serves it, when it may be executed,
-// and what it does.
+// The properties of each kind of request: whether this server serves it, when it may be executed,
+// and its function.
 //
-// A new request is a line of the table in requests.cpp and a function of Run. What clients are told
-// of the server's features, what is refused and why, and what a repetition of the log executes
-// follow from the table.
+// A new request is a line of the table in requests.cpp and a function of Run. The
+// server's features, its refusals with their reasons, and the requests that a repetition of the log
+// executes follow from the table.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct RequestKind {
     looks,
     steers,
     acts
-  };  // reads; changes how the run goes on; changes the world, and is repeated from logs
+  };  // reads; changes the run's pace or state; changes the world, and is repeated from logs
   enum Waits { for_nothing, for_state };  // for the first state: what reads or changes the world
 
   const char* name;

@@ -135,13 +135,13 @@ Outcome Run::admit(const request_t& request, const Session& session) {
   return execute(request, session);
 }
 
-// What a client began a client may end; --restore is the command's own.
+// A client may cancel only a restore of a client; --restore is the command's own.
 bool Run::ends_restore(const RequestKind& kind) const {
   return repeating_ && options_.repeat.empty() && kind.kind == request_t::PAUSE;
 }
 
 Outcome Run::execute(const request_t& request, const Session& session) {
-  tell_readers();  // whoever subscribed before the STEP must see its messages
+  tell_readers();  // clients that subscribed before the STEP must see its messages
   const RequestKind* kind = find_request_kind(request.kind);
   if (!kind || !kind->execute) {
     return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " +

@@ -9,7 +9,7 @@
 namespace ruedo::run {
 namespace {
 
-constexpr std::chrono::seconds kHeldUp{1};  // requests are taken in more often than that
+constexpr std::chrono::seconds kHeldUp{1};  // requests are read more often than that
 
 }  // namespace
 

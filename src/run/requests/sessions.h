@@ -33,21 +33,21 @@ class Sessions {
   static constexpr auto kMaySilence = std::chrono::seconds(3);  // then its place may go to another
   static constexpr int64_t kMostJump = 1024;                    // of sequences that count up
 
-  // What is to be done with a request of a session. too_far: one forged message must not end a
+  // The decision about a request of a session. too_far: one forged message must not end a
   // session for good.
   enum class Verdict { execute, answer_again, wait, too_old, too_far };
 
   Session* find(int64_t id);
-  // The session of a client that joins, the same one for a repeated JOIN. Where all places are
-  // taken, the most silent session gives way, first of those that only ever joined; but none that
-  // `keeps`, if there is such a function, holds on to. Null when there is no place.
+  // The session of a client that joins, the same one for a repeated JOIN. When all places are
+  // occupied, it replaces the most silent session, first of those that have only joined; but none
+  // that `keeps`, if given, protects. Null without a place.
   Session* join(const std::string& client, int64_t sequence,
                 const std::function<bool(int64_t)>& keeps = {});
   // The session was heard, with a request that was taken in at `listened`.
   void hear(Session& session) const { session.last_heard = listened_; }
   void leave(int64_t id);
-  // Requests are taken in now. If that is long after the last time, the process could not listen
-  // (stopped by a signal, busy with a request, without a processor), which is nobody's silence.
+  // Requests are read now. If that is long after the last time, the process could not listen
+  // (stopped by a signal, busy with a request, without a processor): no client was silent then.
   void listen(Time now);
   // When requests were last taken in. A client's silence ends here, not at the clock's time: the
   // process may have been stopped since.
