@@ -1,5 +1,5 @@
-// What ruedo bench measures: a row is a JSON object on one line, and is measured in a process of
-// its own, so that its memory and its start are its own too.
+// The measurements of ruedo bench: a row is a JSON object on one line, measured in a process of its
+// own, so that its memory and its start are its own too.
 #pragma once
 
 #include <string>

@@ -23,7 +23,7 @@ struct Outcome {
   bool met = true;
 };
 
-// What an experiment is given, and where it leaves what it found.
+// The input and the results of an experiment.
 struct Experiments {
   std::filesystem::path pictures;  // folder for plots
   std::vector<Outcome> outcomes;

@@ -26,11 +26,11 @@ constexpr int64_t kStep_us = 5000, kPaperStep_us = 20'000, kLongStep_us = 50'000
 constexpr double kHigh = 4.2, kLow = 0.27;  // m/s^2
 constexpr double kFast = 2.0;               // m/s: more than the triangle's peak
 constexpr int kLaps = 5;
-// The real robot tells its odometry in status packets, by default one each 100 ms.
+// The real robot sends its odometry in status packets, by default one each 100 ms.
 constexpr double kPacket_s = 0.1;
 
 // The paper's loop: `way` and `v` along a primitive, from rest to rest, at limits a and d. done()
-// tells the way so far, go(v) moves for a frame at speed v.
+// is the distance covered, go(v) moves for a frame at speed v.
 template <class Done, class Go>
 void brake_late(double length, double speed, double a, double d, double dt, Done&& done, Go&& go) {
   double v = 0;
@@ -75,13 +75,13 @@ Advance advance(double a, double d, int64_t step_us, Kind drive) {
   return run;
 }
 
-// What E2 measures: the mean over all steps of |true pose - odometry|, component by component.
+// The measure of E2: the mean over all steps of |true pose - odometry|, component by component.
 struct Square {
   double x_m = 0, y_m = 0, theta_rad = 0;  // means
   double worst_m = 0, worst_rad = 0;
   report::Points true_path, believed_path;
 
-  // What the program that drives the robot believes: the odometry of the last status packet.
+  // The pose that the driving program has: the odometry of the last status packet.
   double packet_s = 0;  // between two packets; 0: it knows each step's
   odometry_t packet{};
 

@@ -18,7 +18,7 @@ using Rgba = std::array<float, 4>;
 constexpr int kSides = 12;          // of a point
 constexpr int kTextHeight_px = 40;  // of a line, as it is drawn before it is put into the world
 
-// Where who looks is, and which way the picture's sides go.
+// The viewer's position, and the directions of the picture's sides.
 struct Viewer {
   Vec3 eye, right, up, ahead;
   bool orthographic;

@@ -1,4 +1,4 @@
-// What clients drew in a log, moment by moment, and what that looks like in a picture.
+// The drawings of clients in a log over time, and their appearance in a picture.
 #pragma once
 
 #include <map>
@@ -18,7 +18,7 @@ class DrawnMarkers {
 
   DrawnMarkers(const log::Index& index, const std::string& path);
 
-  // What is there at that time (of the log), which must not go back from call to call.
+  // The drawings at that time (of the log), which must not go back from call to call.
   const Layers& at(SimTime time_us);
 
  private:

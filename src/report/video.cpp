@@ -52,7 +52,7 @@ void Video::check_name(const std::string& file) {
 
 Video::Video(const std::string& file, cv::Size size, double fps)
     : file_(std::filesystem::absolute((check_name(file), file)).string()), out_(file_) {
-  std::signal(SIGPIPE, SIG_IGN);  // the exit code tells that the child has ended
+  std::signal(SIGPIPE, SIG_IGN);  // the exit code shows the child's end
   complaints_ = std::tmpfile();
   int ends[2];
   if (complaints_ == nullptr || ::pipe2(ends, O_CLOEXEC) != 0) {

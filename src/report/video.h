@@ -13,8 +13,8 @@ namespace ruedo::report {
 
 class Video {
  public:
-  // Throws InputError for a name that does not end in .webm or .mp4, EnvironmentError where there
-  // is no ffmpeg, and as OutputFile. What was there before stays until close().
+  // Throws InputError for a name that does not end in .webm or .mp4, EnvironmentError without
+  // ffmpeg, and as OutputFile. An older file stays until close().
   Video(const std::string& file, cv::Size size, double fps);
   ~Video();
   Video(const Video&) = delete;

@@ -1,6 +1,6 @@
 // A force-torque sensor in any kind of joint, on ROBOT/SENSOR.
 //
-// Newton-Euler for what the joint carries: the force of the parent on the child is, summed over the
+// Newton-Euler for the carried links: the force of the parent on the child is, summed over the
 // links beyond the joint, m (a - g) minus their contact forces; the torque is the corresponding sum
 // of moments about the joint's origin. Forces in joints between those links cancel. Accelerations
 // are velocity changes over the last step, contacts (normal force and tangential friction, without
@@ -239,8 +239,8 @@ class ForceTorque : public SensorOf<ForceTorque> {
   Vec3 p_CJ_ = Vec3::Zero();  // the joint's origin, in the child
   Pose X_CS_;
   bool weighs_child_ = true;
-  std::vector<LinkIndex> weighed_;  // links of the side used; empty: there is no value
-  std::vector<BodyIndex> bodies_;   // their bodies
+  std::vector<LinkIndex> weighed_;                // links of the side used; empty: without a value
+  std::vector<BodyIndex> bodies_;                 // their bodies
   IndexedVector<BodyIndex, Vec3> omega_, alpha_;  // world
   SimTime time_ = 0;
 };

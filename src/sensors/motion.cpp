@@ -1,4 +1,4 @@
-// What a robot is executing, on ROBOT/motion: at the drive's status rate, and immediately when a
+// The motion that a robot executes, on ROBOT/motion: at the drive's status rate, and at once when a
 // command or primitive starts, ends or is refused. The last message of a step has the current
 // state; ends and refusals precede it.
 #include <algorithm>

@@ -233,7 +233,7 @@ class Sonar : public SensorOf<Sonar> {
         transducer.noise.apply(range, dt_s, stream);  // drawn with or without an echo
     if (range < max_) range = std::clamp(measured, min_, max_);
     if (cross_talk_ > 0.0) {
-      // Crosstalk: the echo of the transducer that fired before is taken for this one's own if it
+      // Crosstalk: the echo of the transducer that fired before counts as this one's own if it
       // arrives first.
       const bool heard = stream.uniform() < cross_talk_;
       if (heard && last_fired_ >= 0 && last_fired_ != index)

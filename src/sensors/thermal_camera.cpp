@@ -1,4 +1,4 @@
-// A thermal camera: the temperature of what each pixel shows, on ROBOT/CAMERA; intrinsics on /info.
+// A thermal camera: the temperature of each pixel's surface, on ROBOT/CAMERA; intrinsics on /info.
 //
 // Model: a body has the single temperature given by gz-sim's plugin Thermal; everything else and
 // the sky have the air temperature at sea level (<atmosphere>). Emissivity is 1; there is no

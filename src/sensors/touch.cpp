@@ -1,4 +1,4 @@
-// A touch trigger, like gz-sim's TouchPlugin: tells when its model has touched a target for some
+// A touch trigger, like gz-sim's TouchPlugin: reports that its model has touched a target for some
 // time, on ROBOT/DEVICE; at once, and also at its rate. Where Gazebo sends one message and stops,
 // `pressed` stays true here, for late subscribers.
 //

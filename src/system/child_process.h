@@ -29,10 +29,10 @@ struct ProcessResult {
   std::string messages;  // the end of stderr, 64 KiB at most
 };
 
-// Runs words[0], found in PATH, in a process group of its own, with `input` as its stdin. What it
-// writes to stdout and stderr stays in memory: a full disk is no fault, and nothing is left behind
+// Runs words[0], found in PATH, in a process group of its own, with `input` as its stdin. Its
+// stdout and stderr stay in memory: a full disk is no fault, and nothing is left behind
 // when the two processes are killed. `give_up` is polled every 20 ms; true kills the process and
-// its children. Throws EnvironmentError where no process can be started.
+// its children. Throws EnvironmentError if no process can be started.
 ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& limits,
                           const std::function<bool()>& give_up = nullptr,
                           std::string_view input = {});

@@ -1,5 +1,5 @@
-// Our own shared libraries, loaded when they are first needed. What they are linked to
-// takes a tenth of a second to load: a picture's codecs, the renderer. They lie where the program's
+// Our own shared libraries, loaded when they are first needed. The libraries behind them take a
+// tenth of a second to load: a picture's codecs, the renderer. They lie where the program's
 // own copies of libraries lie.
 #pragma once
 

@@ -1,5 +1,5 @@
-// What a process must not leave behind, however it is ended: a socket's name, the folder of a child
-// process, the processes that a shell has started.
+// Things that a process must not leave behind, however it ends: a socket's name, a child process's
+// folder, the processes that a shell has started.
 #pragma once
 
 #include <string>

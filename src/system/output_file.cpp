@@ -44,7 +44,7 @@ std::string part_of(const fs::path& file, const fs::path& folder, int number) {
   return (folder / name).string();
 }
 
-// make: whether it could make a file of that name, which nobody else has; else errno says why.
+// make: whether it could make a new file of that name; else errno has the reason.
 // Returns the name, or "".
 template <class Make>
 std::string made_part(const fs::path& file, const fs::path& folder, Make make) {
@@ -57,7 +57,7 @@ std::string made_part(const fs::path& file, const fs::path& folder, Make make) {
   return "";
 }
 
-// What a path stands for: a descriptor of this process, as /dev/stdout does, or a file, which need
+// The target of a path: a descriptor of this process, as /dev/stdout does, or a file, which need
 // not be there yet.
 struct Target {
   fs::path file;

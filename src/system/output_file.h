@@ -13,10 +13,10 @@ namespace ruedo {
 // is left of it.
 void check_output(const std::string& path);
 
-// A file that comes into being beside the one that it replaces, and takes its name at the end: when
-// the disk is full, or the work fails or is killed, what was there before stays, alone. Devices,
-// FIFOs and open descriptors (/dev/stdout) are written to as they are. What throws EnvironmentError
-// names the file and the reason.
+// A file that is written beside the one that it replaces, and gets its name at the end: if the disk
+// is full, or the work fails or is killed, the old file stays, and no other. Devices, FIFOs and
+// open descriptors (/dev/stdout) are written to as they are. An EnvironmentError names the file and
+// the reason.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws as check_output(), or EnvironmentError

@@ -24,8 +24,8 @@ class PeerOwners {
   std::unordered_map<uint16_t, std::string> by_port_;  // of the peer
 };
 
-// Who of a server's connected sockets, oldest first, give way so that `most` are left: always the
-// newest of the owner who has most of them.
+// Chooses which of a server's connected sockets, oldest first, to close so that `most` are left:
+// always the newest of the owner with most of them.
 std::vector<size_t> who_give_way(std::span<const int> sockets, size_t most, uint16_t server_port);
 
 }  // namespace ruedo

@@ -1,4 +1,4 @@
-// Sensors and drives that call those of plugins, and what is said when a call does not return.
+// Sensors and drives that call those of plugins, and the message if a call does not return.
 #include "system/plugin_guard.h"
 
 #include <algorithm>
@@ -26,9 +26,9 @@ namespace {
 constexpr int kFailed = 4;            // exit code
 constexpr size_t kLongestText = 500;  // characters of what a plugin says
 
-thread_local const char* at_work = nullptr;  // whose code this thread is in; null: nobody's
+thread_local const char* at_work = nullptr;  // the plugin whose code this thread is in, or null
 
-// This thread is in a plugin's code. What that does to this thread's arithmetic ends with it.
+// This thread is in a plugin's code. Its changes of this thread's arithmetic end with it.
 class Call {
  public:
   explicit Call(const std::string& who) : before_(std::exchange(at_work, who.c_str())) {

@@ -1,9 +1,9 @@
 // Every call of a plugin's code goes through here.
 //
-// A plugin's sensors and drives are made inside of objects that call them. Whatever a call throws
+// A plugin's sensors and drives are made inside of objects that call them. An exception of a call
 // becomes an error with the plugin's name; rounding and other modes of arithmetic are as before
-// when it returns; a message must fit what the sensor announced. A call that ends the process, or
-// crashes, is named on the terminal.
+// when it returns; a message must match the sensor's announcement. A call that ends the process, or
+// crashes, is reported on the terminal.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ namespace ruedo {
 SensorKind guarded(SensorKind kind, const std::string& plugin);
 DriveKind guarded(DriveKind kind, const std::string& plugin);
 
-// From now on a plugin's call that ends the process is named. Where the program has handlers of its
-// own for crashes, those stay.
+// From now on a plugin's call that ends the process is reported. Handlers of the program's own for
+// crashes stay.
 void watch_plugin_calls();
 
 }  // namespace ruedo

@@ -79,7 +79,7 @@ std::array<int64_t, 4> state_of(const std::string& path) {
           int64_t{file.st_ctim.tv_sec}, int64_t{file.st_ctim.tv_nsec}};
 }
 
-// What the plugin was built for, by its bytes.
+// The version that the plugin was built for, by its bytes.
 std::string built_for(const std::string& bytes, const std::string& path) {
   if (!std::string_view(bytes).starts_with(kElf))
     throw InputError({path},
@@ -112,8 +112,8 @@ class SameArithmetic {
   std::fenv_t before_;
 };
 
-// What an object at namespace scope throws as it is made comes to no handler, since the dynamic
-// linker made it: the process ends. It says why, and with the code of bad input.
+// No handler catches an exception of an object at namespace scope, since the dynamic linker makes
+// it: the process ends, with a message and the exit code of bad input.
 class EndsWithItsError {
  public:
   explicit EndsWithItsError(const std::string& path) {

@@ -7,11 +7,11 @@
 
 namespace ruedo {
 
-// What it writes to standard error: goes where ours goes, or nowhere.
+// Its standard error: goes where ours goes, or nowhere.
 enum class ItsErrors { shown, dropped };
 
-// What words[0], a path, prints with these arguments. nullopt: it could not be started, or its exit
-// code was not 0.
+// The output of words[0], a path, with these arguments. nullopt: it could not be started, or its
+// exit code was not 0.
 std::optional<std::string> output_of(std::vector<std::string> words, ItsErrors errors);
 
 }  // namespace ruedo

@@ -64,8 +64,8 @@ void allow(const FileHandle& ruleset, const std::string& path, uint64_t rights) 
   if (!added && errno != EBADFD) fail(path.c_str());  // a pipe: no file
 }
 
-// What programs need that do nothing: libraries, the processors, time zones, devices without a
-// content. Not /etc as a whole, not /proc of others.
+// The needs of every program: libraries, the processors, time zones, devices without a content.
+// Not /etc as a whole, not /proc of others.
 constexpr const char* kSystem[] = {"/usr",
                                    "/lib",
                                    "/lib32",
@@ -124,7 +124,7 @@ FileHandle ruleset_of(const Sandbox& sandbox, int version) {
   return ruleset;
 }
 
-// What no program here has a reason to ask of the kernel.
+// System calls that no program here has a reason for.
 constexpr const char* kNever[] = {"ptrace",
                                   "process_vm_readv",
                                   "process_vm_writev",

@@ -1,5 +1,5 @@
-// Confines this process: its access to files by Landlock, its system calls by seccomp. What the
-// kernel does not support is reported.
+// Confines this process: its access to files by Landlock, its system calls by seccomp. Reports
+// parts that the kernel does not support.
 //
 // For untrusted worlds, meshes and logs: a bug in the code that reads them reaches no file beyond
 // those that it needs.
@@ -15,18 +15,18 @@
 namespace ruedo {
 
 struct Sandbox {
-  // Files, and folders with all below them. What is not there is passed over.
+  // Files, and folders with all below them. Missing ones are ignored.
   std::vector<std::string> readable{};
   std::vector<std::string> runnable{};  // and readable: programs
   std::vector<std::string> writable{};  // and readable
-  // What every program reads and may run: the system's libraries, what comes with Ruedo. Without
-  // it, no program is run either.
+  // The files that every program reads and may run: the system's libraries, and Ruedo's own files.
+  // Without it, no program runs either.
   bool system = true;
   // No network, no further process, no signal to others, no other owner, mode or time of a file.
   bool alone = false;
 };
 
-// What this kernel lacks of it: "" is nothing.
+// The parts that this kernel lacks; "": none.
 std::string missing_for_sandbox();
 
 // From now on, for this thread and all threads and programs that it starts; nothing takes it back.

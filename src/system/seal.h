@@ -1,8 +1,8 @@
-// Tells a user's own files from others': a keyed hash (HMAC-SHA256) that nobody else can make.
+// Distinguishes a user's own files from others': a keyed hash (HMAC-SHA256) of this user alone.
 //
 // For files whose content cannot be checked value by value. The key is 32 random bytes in a file
-// that the user alone may read, ruedo/key in $XDG_STATE_HOME or else in ~/.local/state: it is made
-// when something is first sealed. Where none can be kept, nothing is sealed.
+// that only the user may read, ruedo/key in $XDG_STATE_HOME or else in ~/.local/state, made when
+// first needed. If it cannot be stored, nothing is sealed.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace ruedo {
 
 using Seal = std::array<uint8_t, 32>;
 
-// None: there is no key, and none can be made.
+// Nothing without a key, if none can be made.
 std::optional<Seal> seal_of(std::span<const uint8_t> bytes);
 
 // Whether it is this user's seal of these bytes. Makes no key.

@@ -19,7 +19,7 @@ class GlContext {
   virtual std::string backend() const = 0;                // "OSMesa", "EGL"
 };
 
-// Throws EnvironmentError with the remedy if there is no backend, if RUEDO_RENDERER names an
+// Throws EnvironmentError with the remedy without a backend, if RUEDO_RENDERER names an
 // unknown one, or in a process that was forked from one with a context; so does make_current()
 // there.
 std::unique_ptr<GlContext> make_gl_context();

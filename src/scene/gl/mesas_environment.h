@@ -14,7 +14,7 @@ namespace ruedo::scene {
 
 // For as long as it lives, this is the process's environment: make contexts meanwhile. One thread
 // at a time; others may read the environment, and see it without Mesa's variables.
-// It tells Mesa to treat every x86-64 CPU as one with SSE 4.1: Mesa draws with its widest vectors,
+// It makes Mesa treat every x86-64 CPU as one with SSE 4.1: Mesa draws with its widest vectors,
 // and the width affects the last bits. That takes about a sixth more time. No effect on other
 // processors and on CPUs without SSE 4.1.
 // And it has Mesa keep its cache of compiled shaders as a database: by default the cache's index is

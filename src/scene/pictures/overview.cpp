@@ -190,7 +190,7 @@ Box shown_of(const std::vector<Item>& items) {
   return box;
 }
 
-// What is without an end.
+// Shapes without an end.
 std::optional<double> height_of_ground(const world::WorldModel& world) {
   for (const world::ModelInstance& instance : world.models) {
     if (instance.removed) continue;
@@ -224,7 +224,7 @@ std::optional<double> ceiling_of(const world::WorldModel& world, const Box& show
     area.below += own.below;
   });
   if (height_of_ground(world)) area.below += whole;
-  // A mountain hides nothing: there is no floor below it.
+  // A mountain hides nothing: it has no floor below it.
   if (area.above < kCovered * whole || area.below < kCovered * whole) return std::nullopt;
   return floor + kShown_m;
 }

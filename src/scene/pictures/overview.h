@@ -1,4 +1,4 @@
-// What of a world is shown from outside, so that a stranger sees it at once.
+// The part of a world that a picture from outside shows, for somebody who sees it first.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@
 namespace ruedo::scene {
 
 struct Overview {
-  // What holds all robots and nearly all of the models, by volume: one that lies far outside does
-  // not count, nor does a floor that is much larger than what stands on it.
+  // The box of all robots and nearly all of the models, by volume: without one far outside, and
+  // without a floor that is much larger than the things on it.
   Bounds shown;
   double floor = 0.0;  // m, world: what robots stand on
   // m, world: things above it hide what is below; set where, seen from above, more than half of

@@ -166,7 +166,7 @@ class Builder {
     const auto black = [](const Rgba& c) { return c[0] + c[1] + c[2] < 0.003f; };
     if (black(part.diffuse) && !black(material.ambient)) part.diffuse = material.ambient;
     // Many files write opacity 0 where they mean 1 (COLLADA has two opposite conventions); things
-    // that are meant to be invisible have SDF's transparency.
+    // that shall be invisible have SDF's transparency.
     const float opacity = material.diffuse[3] < 0.004f ? 1.0f : material.diffuse[3];
     part.diffuse[3] =
         std::clamp(opacity * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);

@@ -1,5 +1,5 @@
-// What there is to draw, prepared once from the world: meshes, surfaces, and the parts of each kind
-// of link. Plain data, without OpenGL. A thousand robots of one model share their parts; all boxes
+// The content of pictures, prepared once from the world: meshes, surfaces, and each kind of link's
+// parts. Plain data, without OpenGL. A thousand robots of one model share their parts; all boxes
 // of a world share a mesh.
 #pragma once
 

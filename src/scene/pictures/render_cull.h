@@ -69,7 +69,7 @@ class Culler {
   // pixel, and for coarser round shapes; 0: everything in full.
   void collect(const Region& region, const Vec3& origin, double pixels_per_radian,
                bool orthographic, DrawList& list);
-  // What casts shadows in the region, relative to `origin`.
+  // The shadow casters of the region, relative to `origin`.
   void collect_casters(const Region& region, const Vec3& origin, Movers movers, DrawList& list);
 
  private:

@@ -39,7 +39,7 @@ class RenderDevice {
   void begin_colour(int width, int height, int samples);
   void begin_geometry(int width, int height);
   // Shadow maps are squares of `size` texels. One holds static casters and is kept; the one in use
-  // is a copy with the movers drawn on top. `stale`: the area to be copied anew first.
+  // is a copy with the movers drawn on top. `stale`: the area to copy again first.
   void begin_still_shadow(int size);
   void begin_shadow(int size, const PixelBox& stale);
 

@@ -246,7 +246,7 @@ class GlRenderer : public Renderer {
     }
   }
 
-  // What is nearer than the near plane hides what is behind it, as in Gazebo's depth cameras: -inf
+  // Things before the near plane hide those behind them, as in Gazebo's depth cameras: -inf
   // (REP 117).
   void mark_too_near(const View& view, std::vector<float>& depth) {
     if (view.orthographic) return;

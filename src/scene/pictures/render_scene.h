@@ -34,7 +34,7 @@ struct View {
   static View pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad);
 };
 
-// What to draw; each requested buffer is filled, rows from the top. Depth and labels see through
+// The requested buffers of a picture, with rows from the top. Depth and labels see through
 // transparent things.
 struct Picture {
   bool want_rgb = true, want_depth = false, want_labels = false;
@@ -73,8 +73,8 @@ class Renderer {
   virtual std::string description() const = 0;  // for ruedo doctor: backend, renderer, version
 };
 
-// world and layout must outlive the renderer. Throws EnvironmentError with the remedy if there is
-// no backend.
+// world and layout must outlive the renderer. Throws EnvironmentError with the remedy if
+// there is no backend.
 std::unique_ptr<Renderer> make_renderer(const world::WorldModel& world,
                                         const world::BodyLayout& layout);
 

@@ -90,7 +90,7 @@ inline float round_down(double x) {
   return f > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
 }
 
-// The lanes (bits) that a callback is asked about.
+// The lanes (bits) that a callback must decide.
 inline unsigned lanes_of(const RTCIntersectFunctionNArguments& arguments) {
   RTCRayN* rays = RTCRayHitN_RayN(arguments.rayhit, arguments.N);
   unsigned lanes = 0;

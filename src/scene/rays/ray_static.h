@@ -1,5 +1,5 @@
-// What all modules' ray scenes share: the table of shapes, the Embree device, and the tree over
-// static shapes. Internal to src/scene.
+// The shared part of all modules' ray scenes: the table of shapes, the Embree device, and the tree
+// over static shapes. Internal to src/scene.
 #pragma once
 
 #include "scene/rays/ray_scene.h"

@@ -88,7 +88,7 @@ struct RayTable {
       meshes_;
 };
 
-// Eight rays, and the nearest hit of each so far.
+// Eight rays, and the nearest known hit of each.
 struct RayBatch {
   static constexpr int kNothing = std::numeric_limits<int>::max();
 
