@@ -113,7 +113,7 @@ std::string xml_of(const std::string& uri) {
   return read_input(uri.substr(uri.starts_with(kScheme) ? kScheme.size() : 0), kLargest);
 }
 
-// What has no effect, or other nodes would not do without.
+// Reports ignored environment variables, and those that other nodes need.
 void check_environment(const CycloneOptions& options) {
   if (!environment("ROS_STATIC_PEERS").empty() && options.static_peers.empty())
     spdlog::warn("ROS 2: ignored ROS_STATIC_PEERS, as {} says to",
@@ -160,7 +160,7 @@ bool UserSettings::has(std::string_view element) const {
 
 std::string configuration(const CycloneOptions& options) {
   std::string general, peers;
-  // A second list of them would add to the user's, and no interface may be named twice.
+  // A second list of them would add to the user's, and no interface may occur twice.
   const UserSettings own(options.own, options.domain);
   const bool interfaces = !own.has("Interfaces") && !own.has("NetworkInterfaceAddress");
   switch (options.range) {

@@ -100,7 +100,7 @@ QosPointer qos_of(const Endpoint& endpoint) {
 
 void tell(void*, const dds_log_data_t* data);
 
-// What Cyclone says while it starts: why it does not, or else warnings.
+// The messages of Cyclone while it starts: the reason of its failure, or warnings.
 class StartLog {
  public:
   explicit StartLog(const CycloneOptions& options)
@@ -125,7 +125,7 @@ class StartLog {
       lines.emplace_back(line);
     return true;
   }
-  // Not while Cyclone's threads still tell.
+  // Not while Cyclone's threads still call back.
   std::vector<std::string> lines() const {
     const std::lock_guard lock(mutex_);
     return lines_;
@@ -174,7 +174,7 @@ class StartLog {
 
 void warn(std::string_view line) { spdlog::warn("ROS 2: Cyclone DDS: {}", line); }
 
-// Cyclone's own warnings, of which strangers can cause any number: at most one a second, and each
+// Cyclone's own warnings, of which any sender can cause any number: at most one a second, and each
 // text once a minute, for it repeats what lasts (no network) with each message. Refused samples are
 // counted elsewhere.
 bool is_due(std::string_view line) {
@@ -208,7 +208,7 @@ void tell(void*, const dds_log_data_t* data) {
     warn(line);
 }
 
-// What ROS calls the policy for which a reader and a writer do not meet.
+// ROS's name of the policy by which a reader and a writer are incompatible.
 const char* policy_name(uint32_t id) {
   switch (id) {
     case DDS_DURABILITY_QOS_POLICY_ID: return "durability";

@@ -15,7 +15,7 @@ constexpr uint8_t kBigEndianList = 2, kLittleEndianList = 3;  // encodings of a 
 constexpr uint16_t kLocators[] = {0x2f, 0x30, 0x31, 0x32, 0x33, 0x48};
 // RTPS 1's addresses and ports; type information, for which Cyclone 0.10 would ask for the types,
 // and crash on those of Fast DDS 3 (ROS 2 Kilted) while several participants answer; Cyclone's
-// parameter by which a participant may tell of others.
+// parameter by which a participant may announce others.
 constexpr uint16_t kRefused[] = {0x0b, 0x0c, 0x0d, 0x0e, 0x11, 0x45, 0x46, 0x75, 0x8007};
 
 bool is_among(uint32_t id, std::span<const uint16_t> ids) {

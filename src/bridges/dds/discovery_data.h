@@ -1,5 +1,5 @@
-// What a DATA of discovery tells of a participant or an endpoint, as far as it has to be known
-// before Cyclone DDS sees it.
+// The part of a DATA of discovery about a participant or an endpoint that must be known before
+// Cyclone DDS sees it.
 #pragma once
 
 #include <array>
@@ -48,9 +48,9 @@ struct DiscoveryData {
   std::vector<ToldLocator> locators;
 };
 
-// guid: the parameter that names the one that is told of. Old forms of addresses, and that somebody
-// tells of others, become nothing. None: it cannot be read, is too much, or somebody tells of
-// another.
+// guid: the parameter that identifies the announced one. Old forms of addresses, and announcements
+// of other participants, are removed. None: it cannot be read, is too large, or announces another
+// one.
 std::optional<DiscoveryData> discovery_data(const Submessage& part, const Prefix& who,
                                             Parameter guid);
 

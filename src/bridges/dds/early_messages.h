@@ -40,7 +40,7 @@ class EarlyMessages {
   // Cyclone drops the duplicate.
   static constexpr std::array kDelays{std::chrono::milliseconds(5), std::chrono::milliseconds(100)};
 
-  // The newest give way to the oldest: these end by themselves.
+  // Drops the newest in favour of the oldest: these end by themselves.
   void keep(Message message, Clock::time_point now);
   // To be called with each datagram: is_known says whether Cyclone knows a writer.
   void look(const std::function<bool(const Message&)>& is_known, Clock::time_point now);
@@ -61,7 +61,7 @@ class EarlyMessages {
   size_t bytes_ = 0;
 };
 
-// The first submessage that a user's writer says something in: data or a heartbeat. None: there is
+// The first submessage of a user's writer: data or a heartbeat. None if there is
 // none.
 std::optional<std::pair<Prefix, EarlyMessages::Entity>> writer_in(std::span<uint8_t> message);
 

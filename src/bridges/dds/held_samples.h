@@ -1,10 +1,10 @@
-// Bounds what Cyclone DDS holds of samples that are not whole, or whose turn has not come, over all
+// Limits the incomplete and the early samples that Cyclone DDS holds, over all
 // writers.
 //
-// Cyclone's own limits are for each writer, of which strangers can make any number. So whose
-// samples are older than the last kMostHeld bytes that stayed with Cyclone is told to have been
-// dropped by its writer: Cyclone then drops what is not whole and hands over what waited for it. A
-// writer whose samples come in order has nothing to lose by that.
+// Cyclone's own limits are for each writer, of which any sender can make any number. So samples
+// older than the last kMostHeld bytes that stayed with Cyclone are announced as dropped by their
+// writer: Cyclone then drops incomplete ones and delivers those that waited for them. A writer
+// whose samples come in order loses nothing by that.
 #pragma once
 
 #include <cstddef>
@@ -30,8 +30,8 @@ inline constexpr size_t kMostHeld = size_t{128} << 20;  // bytes
 // Writers whose samples may be in one datagram. Samples of other writers are requested again.
 inline constexpr size_t kMostWritersInDatagram = 16;
 
-// Those in an RTPS message. What is of too many writers, or has no possible sequence number,
-// becomes nothing, in place.
+// The samples in an RTPS message. Submessages of too many writers, or with impossible sequence
+// numbers, are removed in place.
 std::vector<Samples> samples_in(std::span<uint8_t> message);
 
 // The RTPS message by which a writer says that it has dropped them: a heartbeat. Returns its size.

@@ -80,7 +80,7 @@ struct Submessage {
   std::optional<size_t> marked;  // the payload with an identity
 };
 
-// None: what is there is no submessage as Cyclone makes them.
+// None if the bytes are not a submessage of Cyclone's form.
 std::optional<Submessage> submessage_at(std::span<const uint8_t> message, size_t begin) {
   if (begin + kSubmessageHeader > message.size()) return std::nullopt;
   const uint8_t flags = message[begin + 1];

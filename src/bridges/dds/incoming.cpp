@@ -21,7 +21,7 @@
 namespace ruedo::dds {
 namespace {
 
-// What all of Cyclone's threads that receive have let in.
+// Shared by all of Cyclone's receiving threads: the accepted messages.
 class Incoming {
  public:
   // A datagram has taken so many bytes that Cyclone may hold.
@@ -29,7 +29,7 @@ class Incoming {
     const std::lock_guard lock(mutex_);
     held_.add(bytes, samples);
   }
-  // A message that nobody sent now: what has to give way, or what came too early. 0: nothing.
+  // A message from here: the departure of a dropped participant, or an early one. 0: none.
   size_t write_notice(std::span<uint8_t> out, ddsi_locator_t& from) {
     const std::lock_guard lock(mutex_);
     if (const auto samples = held_.overdue()) return write_dropped(*samples, out);

@@ -1,4 +1,4 @@
-// Bounds on what strangers' datagrams cost, before Cyclone DDS sees them: here those on fragments,
+// Limits on the cost of untrusted datagrams, before Cyclone DDS sees them: here those on fragments,
 // with those of bridges/dds/held_samples.h and bridges/dds/known_participants.h.
 //
 // Cyclone keeps the datagrams of a sample until it is whole. Its limit on a sample's size holds for
@@ -15,7 +15,7 @@
 
 namespace ruedo::dds {
 
-// Of samples that come: commands, requests and what is said of endpoints.
+// Of received samples: commands, requests and announcements of endpoints.
 constexpr uint32_t kLargestIncoming = 4u << 20;
 // Of fragments: those of the known vendors have 1 kB and more.
 constexpr uint32_t kSmallestFragment = 512;
@@ -23,8 +23,8 @@ constexpr uint32_t kSmallestFragment = 512;
 constexpr size_t kMostBesideFragments = 16u << 10;
 
 // Changes an RTPS message in place. Fragments of too large a sample, or that are too small, get the
-// largest sample size of all, for which Cyclone leaves out the sample, and goes on with the next.
-// Fragments with too much beside them become a submessage that means nothing; they are asked for
+// largest sample size of all, for which Cyclone skips the sample, and continues with the next.
+// Fragments with too much beside them become a submessage without meaning; readers request them
 // again.
 void bound_fragments(std::span<uint8_t> message);
 

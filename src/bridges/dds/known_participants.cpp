@@ -1,4 +1,4 @@
-// Who may tell of participants and endpoints, and what it costs (RTPS 2.5, 8.5).
+// Checks announcements of participants and endpoints, and limits their cost (RTPS 2.5, 8.5).
 #include "bridges/dds/known_participants.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace ruedo::dds {
 namespace {
 
-// Products of a vendor that tell of other participants.
+// Products of a vendor that announce other participants.
 constexpr std::array<uint8_t, 2> kTellsOfOthers{1, 0x20};
 constexpr size_t kFragmentsTopic = 0;
 constexpr size_t kEndpoint = 2048;  // bytes that Cyclone needs for an endpoint

@@ -1,10 +1,10 @@
-// Bounds how many participants Cyclone DDS knows, and how much of their endpoints.
+// Limits the number of participants that Cyclone DDS knows, and of their endpoints.
 //
 // Cyclone's work for each newcomer, and at the end, grows with the square of the number that it
-// knows, and a false one costs a stranger one datagram. So a socket has its share, as programs have
-// one each; so it is with endpoints of one topic and with addresses, of which Cyclone seeks the
-// fewest that reach all readers. Where there is no room, who was not heard for longest gives way,
-// or who has the most endpoints; Cyclone gets a message that it has left.
+// knows, and a false one costs a sender one datagram. So a socket has its share, as programs have
+// one each; so have endpoints of one topic and addresses, of which Cyclone seeks the fewest that
+// reach all readers. Without room, the participant that was silent longest is dropped, or the one
+// with the most endpoints; Cyclone gets a message that it has left.
 #pragma once
 
 #include <array>
@@ -35,17 +35,17 @@ class KnownParticipants {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // What a participant announces again before that is passed over.
+  // Announcements that a participant repeats within this time are ignored.
   static constexpr std::chrono::milliseconds kRepeat{100};
-  // One of those known, and one of a socket's, gives way so often at most.
+  // A known participant, and one of a socket's, is dropped so often at most.
   static constexpr std::chrono::milliseconds kTurn{20};
   // Cyclone has taken notice of an endpoint by then, on a machine that is busy.
   static constexpr std::chrono::milliseconds kLately{100};
 
-  // This program's own, to whom messages may be addressed.
+  // This program's own participant, to which messages may be addressed.
   void serve(const Prefix& participant) { own_.insert(participant); }
 
-  // Changes an RTPS message from that address in place: what may not be told becomes nothing.
+  // Changes an RTPS message from that address in place: removes announcements that are not allowed.
   void bound(std::span<uint8_t> message, const Address& from, Clock::time_point now);
 
   // Who has given way, in turn.
@@ -69,7 +69,7 @@ class KnownParticipants {
     size_t topic, bytes;
     Clock::time_point told;
   };
-  // What is told in fragments cannot be read: it is an endpoint of its own for each number.
+  // Fragmented announcements cannot be read: each number counts as an endpoint of its own.
   using EndpointKey = std::pair<Entity, int64_t>;
   struct Known {
     Address from;

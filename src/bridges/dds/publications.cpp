@@ -11,7 +11,7 @@ namespace ruedo::dds {
 namespace {
 
 constexpr size_t kMostTaken = 64;       // at once
-constexpr size_t kMostKnown = 100'000;  // strangers can announce any number
+constexpr size_t kMostKnown = 100'000;  // any sender can announce any number
 
 std::array<uint8_t, 16> bytes_of(const dds_guid_t& guid) {
   std::array<uint8_t, 16> bytes{};

@@ -23,7 +23,7 @@ namespace {
 std::atomic<uint64_t> refused{0};
 
 // The memory for a topic's samples that are waiting, with a share for each writer, so that one that
-// sends without end displaces nobody's samples.
+// sends without end displaces no other's samples.
 class Room {
  public:
   // False: there is no room.

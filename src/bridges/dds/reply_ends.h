@@ -38,8 +38,8 @@ class ReplyEnds {
   dds_entity_t requests_, replies_;
   std::map<dds_instance_handle_t, bool> hears_;               // cached until endpoints change
   std::map<dds_instance_handle_t, Clock::time_point> until_;  // those being waited for
-  uint32_t ends_ = 0;                   // number of endpoints discovered so far
-  std::map<Participant, size_t> deaf_;  // how many were waited for in vain
+  uint32_t ends_ = 0;                                         // number of discovered endpoints
+  std::map<Participant, size_t> deaf_;                        // how many were waited for in vain
 };
 
 }  // namespace ruedo::dds

@@ -1,4 +1,4 @@
-// The submessages of an RTPS message, as they come from strangers (RTPS 2.5, 9.4).
+// The submessages of an untrusted RTPS message (RTPS 2.5, 9.4).
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ struct Submessage {
     kInfoDestination = 0x0e,
     kData = 0x15,
     kDataFrag = 0x16,
-    kNothing = 0xff,  // a vendor's own, which nobody knows
+    kNothing = 0xff,  // a vendor's own, which no reader knows
   };
   static constexpr uint8_t kLittleEndian = 1;
   // Of Data and DataFrag: where the writer and its sequence number are; of a DataFrag, these and
@@ -62,8 +62,8 @@ struct Submessage {
   bool is_fragment() const { return kind() == kDataFrag && bytes.size() >= kFragmentHead; }
   bool is_source() const { return kind() == kInfoSource && bytes.size() >= kSourceSize; }
   void erase() const { bytes[0] = kNothing; }
-  // Of a fragment: gets the largest sample size of all, for which Cyclone leaves out the sample,
-  // and goes on with the next.
+  // Of a fragment: sets the largest sample size of all, for which Cyclone skips the sample,
+  // and continues with the next.
   void leave_out() const { std::fill_n(bytes.begin() + kSampleSize, 4, uint8_t{0xff}); }
   uint32_t number(size_t at, size_t size) const {
     uint32_t value = 0;

@@ -49,7 +49,7 @@ Pose pose_of(const double* position, const double* orientation) {
               Vec3(position[0], position[1], position[2])};
 }
 
-// What Foxglove calls a format of raw pixels; null: it has none for it.
+// Foxglove's name of a format of raw pixels; null if it has none.
 const char* encoding_of(int32_t format) {
   switch (format) {
     case image_t::PIXEL_FORMAT_GRAY: return "mono8";
@@ -376,7 +376,7 @@ void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
     ++left_out_;
     return;
   }
-  // What Foxglove's type leaves out is there.
+  // The fields that Foxglove's type lacks.
   const std::string own = shown == Shown::partly ? topic + "/values" : topic;
   out_.add_message(channel(own, "ruedo." + schema->name, json_schema(*schema)), time_ns, json, "");
 }

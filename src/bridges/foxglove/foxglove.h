@@ -1,5 +1,5 @@
-// Messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has
-// no type for, and what its type leaves out, goes along as JSON of Ruedo's own types.
+// Messages as Foxglove shows them: frames, scans, pictures, poses, the scene. Messages and fields
+// that its types lack are sent as JSON of Ruedo's own types.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class FoxgloveOutput {
   // key: of what holds until the next message of that key; "": of nothing.
   virtual void add_message(uint16_t channel, uint64_t time_ns, const std::string& json,
                            const std::string& key) = 0;
-  // False when no client wants what comes on this topic, or on TOPIC/values.
+  // False if no client reads this topic, or TOPIC/values.
   virtual bool wants(const std::string& topic) const {
     static_cast<void>(topic);
     return true;
@@ -66,12 +66,12 @@ class FoxgloveExport {
 
   explicit FoxgloveExport(FoxgloveOutput& out) : out_(out) {}
 
-  // What runs from now on: frames of robots and devices, and what the world looks like.
+  // The run from now on: frames of robots and devices, and the look of the world.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   // A message as it came. One of an unknown type, or damaged, is left out and counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
 
-  // What a client drew, in a markers_t or an applied_t; false for all else.
+  // A client's drawing, in a markers_t or an applied_t; false for other messages.
   bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
 
   uint64_t left_out() const { return left_out_; }

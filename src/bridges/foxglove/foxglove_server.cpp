@@ -45,7 +45,7 @@ constexpr int kPort = 8765;                        // Foxglove's own default
 constexpr size_t kMostQueued = size_t{64} << 20;   // bytes between the run and this
 constexpr size_t kMostWaiting = size_t{32} << 20;  // bytes that wait for one viewer
 constexpr size_t kMostViewers = 16;
-constexpr size_t kMostLayers = 64;  // of what clients draw, for who comes later
+constexpr size_t kMostLayers = 64;  // of clients' drawings, for later viewers
 constexpr size_t kMostChannels = 65'000;
 constexpr size_t kMostOfChannel = 8, kMostPublished = 100;  // subscriptions, topics of one viewer
 constexpr SimTime kClockPeriod_us = 20'000;
@@ -100,7 +100,7 @@ uint32_t id_of(const json& value) {
 
 class Viewer;
 
-// What both threads share.
+// The state that both threads share.
 struct Hub {
   std::mutex mutex;               // of all that follows
   std::vector<Channel> channels;  // by id
@@ -108,7 +108,7 @@ struct Hub {
   std::map<std::string, std::string> inputs;  // names that publish velocities to: the bus's
   uint64_t dropped = 0;
   bool news = false;
-  std::atomic<uint64_t> audience{0};  // grows with each change of who subscribes to what
+  std::atomic<uint64_t> audience{0};  // grows with each change of subscriptions
 
   std::function<void(const std::string& channel, const std::vector<uint8_t>&)> inject;
 

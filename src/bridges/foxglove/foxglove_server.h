@@ -15,8 +15,8 @@ class FoxgloveServer {
  public:
   // Before any work. Throws as open().
   static void check(const std::string& address);
-  // From now on it may be connected to; the run's messages come to it as it goes on. address: as
-  // of --view. Throws InputError, and EnvironmentError when the port cannot be had.
+  // From now on clients may connect, and get the run's messages. address: as of --view. Throws
+  // InputError, and EnvironmentError if the port is in use.
   static std::unique_ptr<FoxgloveServer> open(run::Run& server, const std::string& address);
 
   virtual ~FoxgloveServer() = default;  // after the run, before the server

@@ -1,6 +1,6 @@
 // The requests to a service, in the order in which they are answered: round-robin over clients,
-// each client's calls in order, at a limited rate. A client that calls without end delays nobody,
-// and floods nobody with answers: each answer of a service goes to all its clients, and one that
+// each client's calls in order, at a limited rate. A client that calls without end delays no
+// other, and floods none with answers: each answer of a service goes to all clients, and one that
 // has too little of a processor for them loses its own among them.
 #pragma once
 
@@ -76,7 +76,7 @@ class FairQueue {
   Credit all_, crowds_;
   std::map<uint64_t, std::deque<Item>> waiting_;  // by client; no empty entries
   size_t size_ = 0;
-  uint64_t last_ = 0;  // who had the last turn
+  uint64_t last_ = 0;  // the client of the last turn
   Clock::time_point refilled_;
 };
 

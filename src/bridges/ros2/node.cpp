@@ -16,7 +16,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-constexpr auto kLook = std::chrono::milliseconds(20);  // interval of checks who reads pictures
+constexpr auto kLook = std::chrono::milliseconds(20);  // interval of checks for readers of pictures
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
@@ -194,7 +194,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   tell_graph();
 }
 
-// What changed is written. The description of a removed robot is withdrawn.
+// Writes changed descriptions. The description of a removed robot is withdrawn.
 void Node::tell_standing() {
   std::map<std::string, Standing> told;
   for (const Conversions::Standing& each : conversions_->standing()) {
@@ -237,8 +237,8 @@ void Node::add_command(std::map<std::string, Input>& inputs, const Command& comm
             [this, command](const Sample& sample) { on_command(command, sample.cdr); });
 }
 
-// The reader that there is goes on where it does the same. Else it ends first: no message is to be
-// taken twice.
+// An existing reader that does the same stays. Else it ends first: no message may be read
+// twice.
 void Node::add_input(std::map<std::string, Input>& inputs, Input input,
                      Transport::Handler handler) {
   auto known = inputs_.extract(key(input.topic));

@@ -96,7 +96,7 @@ class Node : public run::Sink {
   void on_command(const Command& command, std::span<const uint8_t> cdr);
   void receive_pose(const std::string& robot, const std::string& topic,
                     const Sample& sample);  // initialpose
-  bool may_warn();                          // once a second, whatever strangers send
+  bool may_warn();                          // once a second, whatever others send
   void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;

@@ -18,7 +18,7 @@ inline constexpr Qos kSensorQos{true, false, 5};
 inline constexpr Qos kStateQos{true, false, 10};
 inline constexpr Qos kTfQos{true, false, 100};
 inline constexpr Qos kLatchedQos{true, true, 1};
-// What clients draw: a message is of one layer, and who misses it misses that.
+// Clients' drawings: a message is of one layer, which a reader without it lacks.
 inline constexpr Qos kMarkersQos{true, true, 100};
 inline constexpr Qos kCommandQos{true, false, 10};
 // Shared by all clients of a service: messages of one must not displace those of another. The

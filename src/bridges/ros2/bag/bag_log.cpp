@@ -102,7 +102,7 @@ fs::path place_below(const fs::path& folder, const std::string& name, const std:
   return place;
 }
 
-// What the disk is to hold of a bag: its length may lie, and takes no room in a sparse file.
+// The room that a bag needs on the disk: its length may be forged, and needs none in a sparse file.
 class Room {
  public:
   void take(const std::string& bag, uint64_t size) {

@@ -161,7 +161,7 @@ void Rosbag::require_room(uint64_t attached_bytes) const {
                                             kMostAttachedBytes));
 }
 
-// A log may be a stranger's: only files of its world with the expected content are read.
+// A log may be untrusted: only files of its world with the expected content are read.
 void Rosbag::attach_files(log_header_t header, const std::string& log) {
   if (!log::fault_of_names(header).empty()) return;
   std::vector<std::string> names;

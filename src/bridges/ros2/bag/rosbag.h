@@ -1,8 +1,8 @@
 // A log as a ROS 2 bag: a folder with an MCAP file of CDR messages and the metadata.yaml by which
 // rosbag2 finds it.
 //
-// What no topic holds in full is in attachments, which ROS's readers ignore: a log of those
-// messages (kRest), and the files that the world was made from. BagLog restores the log from all of
+// Messages that no topic holds in full are in attachments, which ROS's readers ignore: a log of
+// those messages (kRest), and the files of the world. BagLog restores the log from all of
 // it.
 #pragma once
 
@@ -48,7 +48,7 @@ class Rosbag {
   static constexpr size_t kMostAttachments = 10'001;  // the files of a log's header, and kRest
 
   uint64_t messages() const { return out_->messages(); }
-  // Bytes of the bag so far, with those of the rest that is attached at its end.
+  // Bytes of the bag, with those of the rest that is attached at its end.
   uint64_t size() const { return out_->size() + static_cast<uint64_t>(rest_->size()); }
   uint64_t left_out() const { return left_out_; }
 
@@ -64,7 +64,7 @@ class Rosbag {
   // of the bag learns that.
   bool write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr,
              const std::string& says_all_of = "");
-  // What a client drew; false for all else.
+  // A client's drawing; false for other messages.
   bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
   void attach_files(log_header_t header, const std::string& log);
   void require_room(uint64_t attached_bytes) const;

@@ -132,7 +132,7 @@ class CdrReader {
     for (size_t i = 0; i < count && good_; ++i) get<Number>();
   }
 
-  // Whether everything so far lay within the bytes.
+  // Whether all values read lay within the bytes.
   bool good() const { return good_; }
 
  private:

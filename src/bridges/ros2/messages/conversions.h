@@ -40,7 +40,7 @@ class Conversions {
   using Wanted = std::function<bool(size_t topic)>;
   using Emit = std::function<void(size_t topic, std::span<const uint8_t> cdr)>;
 
-  // info: all parts of ruedo/info. names: are told of its robots.
+  // info: all parts of ruedo/info. names: get its robots.
   Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options,
               Names& names);
   ~Conversions();

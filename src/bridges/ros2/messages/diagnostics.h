@@ -8,14 +8,14 @@
 
 namespace ruedo::ros2 {
 
-// What is counted elsewhere, since the run began.
+// Counts of other parts, since the run began.
 struct HealthCounts {
   uint64_t lost_on_bus = 0;  // messages that the bus could not send, or not in time
   uint64_t missed = 0;       // that this node was too slow for
   uint64_t sent = 0;         // to ROS
   uint64_t dropped = 0;      // that DDS did not take
   uint64_t received = 0;     // commands from ROS
-  uint64_t faulty = 0;       // that were no messages, too large or too many
+  uint64_t faulty = 0;       // that did not decode, were too large or too many
 };
 
 class Diagnostics {

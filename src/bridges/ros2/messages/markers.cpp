@@ -88,7 +88,7 @@ void put_marker(CdrWriter& out, const marker_t& marker) {
     put_points(out, marker);
 }
 
-// What only other kinds have: texture, its coordinates; then the text; then a mesh.
+// Fields of other kinds only: texture, its coordinates; then the text; then a mesh.
 void put_rest(CdrWriter& out, const std::string& text) {
   out.put("");
   put_header(out, 0, "");

@@ -1,4 +1,4 @@
-// What clients draw as visualization_msgs/MarkerArray: a layer is a namespace.
+// Clients' drawings as visualization_msgs/MarkerArray: a layer is a namespace.
 #pragma once
 
 #include <cstdint>
@@ -35,17 +35,17 @@ struct Arrow {
 void put_arrow(CdrWriter& out, int64_t utime, const std::string& frame, const std::string& layer,
                int32_t id, const Arrow& arrow);
 
-// What clients have drawn in a run so far, on a topic of its own. Who comes later is sent the
-// newest of each layer: a writer keeps one message for latecomers, of one layer.
+// The drawings of clients in a run, on a topic of its own. A later reader gets the newest of each
+// layer: a writer keeps one message for later readers, of one layer.
 class DrawnTopic {
  public:
-  static constexpr size_t kMostLayers = 64;  // the newest of them; others are taken away
+  static constexpr size_t kMostLayers = 64;  // the newest of them; others are deleted
 
   DrawnTopic(std::unique_ptr<Writer> writer, const Names& names);
 
-  // What a client drew, of a record of the run; anything else is none of it.
+  // A client's drawing, from a record of the run; other records are ignored.
   void take(std::span<const uint8_t> record, int64_t utime);
-  // Looks who has come since the last time.
+  // Finds readers that have come since the last time.
   void look(int64_t utime);
   const Writer& writer() const { return *writer_; }
 

@@ -33,7 +33,7 @@ class Names {
 
   // Robots that have another namespace than their name ("fleet/alice"), from the next update() on.
   void wish(std::map<std::string, std::string> namespaces) { wished_ = std::move(namespaces); }
-  // What robots there are. Each keeps its name in ROS for as long as it is there.
+  // The robots of the run. Each keeps its name in ROS for as long as it exists.
   void update(const std::set<std::string>& robots);
 
   // "/alice/scan" for ("alice", "scan"); the world's own names have robot "". Throws InputError if
@@ -48,7 +48,7 @@ class Names {
   };
   std::vector<TfTree> tf_trees(const std::string& robot) const;
 
-  // Throws InputError if a remap names no topic that was used so far.
+  // Throws InputError if a remap's topic has not been used.
   void check_remaps();
 
  private:

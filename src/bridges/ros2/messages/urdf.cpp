@@ -1,5 +1,5 @@
-// Writes a robot as URDF. What URDF cannot express (planes, cones, ellipsoids, meshes without a
-// file) is left out, with a comment.
+// Writes a robot as URDF. Shapes that URDF lacks (planes, cones, ellipsoids, meshes without a
+// file) are left out, with a comment.
 #include <filesystem>
 #include <limits>
 

@@ -80,13 +80,13 @@ class Entities {
     bool is_said = false;  // category, description and tags are a client's
   };
 
-  // What there is from now on; null: nothing.
+  // The entities from now on; null: none.
   void update(std::shared_ptr<const world::WorldModel> world);
   const world::WorldModel* world() const { return world_.get(); }
 
   // Null: unknown.
   const Entity* find(const std::string& name) const;
-  // Category, description and tags for as long as the entity is there; false: there is none.
+  // Category, description and tags for as long as the entity exists; false without one.
   bool say(const std::string& name, uint8_t category, std::string description,
            std::vector<std::string> tags);
   std::vector<std::string> matching(const EntityFilter& filter) const;

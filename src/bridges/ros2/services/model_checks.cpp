@@ -13,7 +13,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-// The name of the first element, "": there is none.
+// The name of the first element, "" without one.
 std::string root_of(const std::string& text) {
   for (size_t at = text.find('<'); at != text.npos; at = text.find('<', at + 1)) {
     if (text.compare(at, 4, "<!--") == 0) at = text.find("-->", at);
@@ -36,7 +36,7 @@ bool is_known_format(const std::string& file, const std::string& text) {
   return is_one_of(extension, {"", ".sdf", ".urdf", ".xacro", ".xml", ".world", ".model"});
 }
 
-// What a model lacks, or cannot use, of its files.
+// The files that a model lacks, or cannot use.
 Result result_of(const world::LoadedModel& loaded) {
   const auto has = [](const Finding& finding, const char* words) {
     return finding.text.find(words) != std::string::npos;

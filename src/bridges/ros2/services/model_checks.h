@@ -1,5 +1,5 @@
-// Reads models before the run is asked to spawn them, to say what is wrong with one: in a thread of
-// its own, one after the other, each under a budget of time and memory.
+// Reads models before the request to spawn them, to report their errors: in a thread of its
+// own, one after the other, each under a budget of time and memory.
 #pragma once
 
 #include <condition_variable>

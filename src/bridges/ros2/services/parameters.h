@@ -1,5 +1,5 @@
-// The parameters of the node, with the services that each ROS node has for them: what can be looked
-// at and set while a run goes on.
+// The parameters of the node, with the services that each ROS node has for them: settings that
+// programs read and change during a run.
 #pragma once
 
 #include <atomic>
@@ -21,11 +21,11 @@ namespace ruedo::ros2 {
 
 class Parameters {
  public:
-  // inject: a message for the run. faulty: counts what is no request. Throws EnvironmentError.
+  // inject: a message for the run. faulty: counts malformed requests. Throws EnvironmentError.
   Parameters(const ServiceContext& context, Requests& requests, Requests::Inject inject,
              std::atomic<uint64_t>& faulty);
 
-  // What there is in the run from now on. Any thread.
+  // The contents of the run from now on. Any thread.
   void update(const std::vector<world_info_t>& info);
 
   std::vector<Topic> list() const;  // the services

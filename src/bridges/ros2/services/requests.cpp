@@ -111,7 +111,7 @@ void Requests::pump() {
   }
 }
 
-// Who waits in vain where the run lets nobody join.
+// Returns the waiting requests to refuse, if the run lets no client join.
 std::vector<Requests::Asked> Requests::joined(const reply_t& reply) {
   std::vector<Asked> refused;
   join_sequence_ = 0;

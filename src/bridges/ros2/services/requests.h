@@ -1,5 +1,5 @@
-// A client of the run's requests: it joins when it has something to ask, and hands each answer to
-// who asked. Who asks much waits for its own answers, and keeps nobody else waiting.
+// A client of the run's requests: it joins at the first request, and hands each answer to its
+// caller. A caller with many requests waits for its own answers, and delays no other.
 #pragma once
 
 #include <chrono>
@@ -37,7 +37,7 @@ class Requests {
   // Where requests go; "": the run takes none.
   void listen(const std::string& channel);
 
-  // Any thread. client: who asks. `then` is called once, in this thread (when nothing can be asked)
+  // Any thread. client: the caller. `then` is called once, in this thread (if it cannot be sent)
   // or in that of reply().
   void send(uint64_t client, int32_t kind, std::vector<uint8_t> body, Then then);
 

@@ -1,5 +1,5 @@
-// What a ROS message was made from, of those types whose messages say all of it: scans and
-// pictures, which are most of a bag's bytes.
+// Restores the message from which a ROS message was made, of those types that hold all of it: scans
+// and pictures, which are most of a bag's bytes.
 #pragma once
 
 #include <cstdint>

@@ -67,7 +67,7 @@ class ServiceServer {
  public:
   using Handler = std::function<void(const CallPointer& call)>;
 
-  // name: without a namespace; type: "pkg/srv/Name". faulty: counts what is no request. Throws
+  // name: without a namespace; type: "pkg/srv/Name". faulty: counts malformed requests. Throws
   // EnvironmentError.
   ServiceServer(const ServiceContext& context, const std::string& name, const std::string& type,
                 Handler handler, std::atomic<uint64_t>& faulty);

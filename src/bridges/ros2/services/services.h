@@ -29,7 +29,7 @@ class Services {
   // Throws EnvironmentError.
   Services(const ServiceContext& context, Requests& requests, const Requests::Inject& inject);
 
-  // What there is in the run from now on; world: null where it is not known. Any thread.
+  // The contents of the run from now on; world: null if it is unknown. Any thread.
   void update(const std::vector<world_info_t>& info,
               std::shared_ptr<const world::WorldModel> world);
   // Namespaces of spawned robots, by name, if a client requested one.

@@ -126,7 +126,7 @@ void Services::spawn_next(const std::shared_ptr<Orders>& orders) {
   send(orders->call, out);
 }
 
-// What can be said without the model.
+// The checks without the model.
 Result Services::fault_of(const Order& order) const {
   const spawn_request_t& body = order.body;
   if (body.model.empty() && body.text.empty()) return {kNoResource, "give uri or resource_string"};

@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kType = "simulation_interfaces/action/SimulateSteps";
 constexpr uint8_t kOk = 1, kFailed = 4;  // simulation_interfaces/msg/Result
-constexpr uint64_t kNode = 0;            // who asks for the steps of a goal: no client
+constexpr uint64_t kNode = 0;            // the caller of a goal's steps: not a client
 
 int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(

@@ -1,5 +1,5 @@
 // The action simulation_interfaces/SimulateSteps, as ROS maps actions: three services and two
-// topics. One goal at a time; it takes a step, tells of it, and takes the next.
+// topics. One goal at a time; it takes a step, sends feedback, and takes the next.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace ruedo::ros2 {
 
 class StepAction {
  public:
-  // faulty: counts what is no request. Throws EnvironmentError.
+  // faulty: counts malformed requests. Throws EnvironmentError.
   StepAction(const ServiceContext& context, Requests& requests, std::atomic<uint64_t>& faulty);
 
   Topic topic() const;  // the action's name and type
