@@ -697,7 +697,7 @@ def test_elementary_functions_are_ours():
     assert not problems, "\n" + "\n".join(problems)
 
 
-def test_a_foreign_function_is_named(tmp_path):
+def test_a_foreign_function_is_reported(tmp_path):
     (tmp_path / "src/robot").mkdir(parents=True)
     (tmp_path / "include").mkdir()
     (tmp_path / "src/robot/a.cpp").write_text(
@@ -711,7 +711,7 @@ def test_a_foreign_function_is_named(tmp_path):
 
 
 @pytest.mark.skipif("RUEDO_BINARY_DIR" not in os.environ, reason="started without a build")
-def test_what_is_built_takes_no_elementary_function_from_outside():
+def test_binaries_import_no_elementary_function():
     build = Path(os.environ["RUEDO_BINARY_DIR"])
     built = [
         build / "bin/ruedo",

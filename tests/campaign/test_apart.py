@@ -362,7 +362,7 @@ def test_a_package_is_found_without_being_imported(tmp_path, line):
     assert "1 passed" in ruedo("campaign", "run", "c.yaml", folder=tmp_path).stdout
 
 
-def test_a_lock_that_is_no_file_is_not_waited_for(folder):
+def test_a_lock_that_is_not_a_regular_file_is_refused(folder):
     (folder / "out").mkdir()
     os.mkfifo(folder / "out/lock")
     said = ruedo("campaign", "run", "c.yaml", "--out", "out", folder=folder, code=4).stderr
@@ -378,7 +378,7 @@ def measure(log):
 
 
 @pytest.mark.parametrize("way", ["python", "command"])
-def test_a_full_temporary_folder_is_no_fault_of_the_controllers(tmp_path, way):
+def test_a_full_temporary_folder_is_not_blamed_on_the_controller(tmp_path, way):
     """Regression: it was stored as a crash, and never repeated."""
     program = f"{sys.executable} -c 'import ruedo; ruedo.connect(timeout={PATIENCE}).step(1000)'"
     ways = {

@@ -287,7 +287,7 @@ def test_a_picture_that_is_read_late_is_of_the_seed_of_its_moment():
     assert pictures(1, ":reseeded@0.35,value=7", record=False) == drawn[1]
 
 
-def test_a_robot_that_comes_and_time_that_begins_anew_have_the_new_seed(tmp_path):
+def test_a_spawned_robot_and_a_reset_use_the_new_seed(tmp_path):
     (tmp_path / "w.sdf").write_text(HALL)
 
     def scans(seed, begin, log):

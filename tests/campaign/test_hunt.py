@@ -266,7 +266,7 @@ def test_why_leaves_models_out_and_knows_of_other_parameters(tmp_path):
     assert "p3at" not in str(changes)
 
 
-def test_a_robot_that_is_put_into_an_obstacle_is_no_find(tmp_path):
+def test_a_robot_placed_in_an_obstacle_does_not_count_as_a_failure(tmp_path):
     """Regression: what was kept stayed red, whatever became of the controller."""
     obstacles = {"most": 1, "area": [-0.01, -0.01, 0.01, 0.01], "size": [0.4, 0.5]}
     folder = blind(tmp_path, "stand", obstacles=obstacles)
@@ -315,7 +315,7 @@ def test_why_reports_the_damage_of_a_log(tmp_path, harm):
     assert said.count("\n") == 1
 
 
-def test_a_kept_program_runs_in_its_folder_and_is_run_anew_when_it_changes(tmp_path):
+def test_a_kept_program_runs_in_its_folder_and_again_when_it_changes(tmp_path):
     """Regressions: a folder's name was not quoted, and its files were looked for elsewhere, so that
     an old result stood for a mended program."""
     home = tmp_path / "lab's 1"

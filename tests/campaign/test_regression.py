@@ -129,7 +129,7 @@ def test_a_wrong_argument_is_reported(tmp_path, given, text):
         ("'arena', duration=1, tolerance=[]", "no argument 'tolerance': there are client, durat"),
     ],
 )
-def test_the_fixture_tells_it_too(pytest_on, tmp_path, given, text):
+def test_the_fixture_reports_it_too(pytest_on, tmp_path, given, text):
     said = pytest_on(
         tmp_path / "test_it.py",
         f"def test_it(ruedo_regression):\n    ruedo_regression({given})\n",
@@ -146,7 +146,7 @@ def test_a_worlds_name_may_begin_as_an_option_does(tmp_path):
     assert run.log.exists() and "passed" in run.output
 
 
-def test_a_golden_log_is_renewed_by_the_words_of_the_command(tmp_path, monkeypatch):
+def test_the_environment_variable_renews_as_in_the_command(tmp_path, monkeypatch):
     """Regression: `yes` was refused here, and taken there."""
     (tmp_path / "w.sdf").write_text(WORLD)
     given = {"duration": 0.1, "golden": tmp_path / "g.lcm", "record": tmp_path / "run.lcm"}
@@ -201,14 +201,14 @@ def test_it(ruedo_regression, broken):
     ],
 )
 @pytest.mark.parametrize("of", ["", "from ruedo.regression import ruedo_regression\n"])
-def test_who_has_not_come_to_its_run_is_not_blamed_for_it(pytest_on, tmp_path, of, test, said):
+def test_a_test_that_fails_before_its_run_shows_its_own_error(pytest_on, tmp_path, of, test, said):
     """Also where the fixture alone was imported, and no plugin is loaded."""
     more = ["-p", "no:ruedo"] if of else []
     told = pytest_on(tmp_path / "test_it.py", f"import pytest\n{of}{test}\n", *more)
     assert said in told, told
 
 
-def test_where_nothing_ran_nothing_passed(tmp_path, monkeypatch):
+def test_a_missing_run_fails(tmp_path, monkeypatch):
     """As by another program than ruedo."""
     monkeypatch.setenv("RUEDO", "/bin/true")
     with pytest.raises(RegressionFailed, match="there was no run"):
@@ -243,12 +243,12 @@ def test_paths_are_relative_to_the_tests_file(pytest_on, tmp_path):
         assert (tmp_path / "sub" / name).exists()
 
 
-def test_an_option_without_its_value_is_named(tmp_path):
+def test_an_option_without_its_value_is_reported(tmp_path):
     with pytest.raises(RegressionFailed, match="--json"):
         run_regression("arena", duration=1, record=tmp_path / "run.lcm", options=["--json"])
 
 
-def test_words_are_no_shells(tmp_path):
+def test_arguments_are_not_parsed_by_a_shell(tmp_path):
     """Also empty ones, and names of files that are no UTF-8."""
     (tmp_path / "caf\udce9").write_text("no UTF-8")
     (tmp_path / "w.sdf").write_text(WORLD)

@@ -114,7 +114,7 @@ def test_kills_of_the_driver_and_of_workers_cost_the_runs_under_way_alone(whole)
     assert table(folder, "--out", str(out)) == expected
 
 
-def test_nothing_is_run_twice_and_a_changed_controller_is_run_anew(folder):
+def test_nothing_runs_twice_and_a_changed_controller_runs_again(folder):
     campaign = Campaign(folder / "c.yaml")
     ran = []
     campaign.run(workers=1, progress=lambda case, _: ran.append(case.number))
@@ -298,7 +298,7 @@ KEPT = "; what was run is kept, `ruedo campaign resume` does the rest"
         ("hunt", "TERM", False, ""),
     ],
 )
-def test_who_ends_a_campaign_leaves_nothing_behind(words, told, hang, kept, folder):
+def test_ending_a_campaign_leaves_nothing_behind(words, told, hang, kept, folder):
     """Neither processes, of its controllers' either, nor folders, whether or not the workers hang;
     what was run is kept. Or a hunt, which keeps nothing.
     """
@@ -562,7 +562,7 @@ def fourth(view):
 """
 
 
-def test_a_report_tells_causes_apart(tmp_path):
+def test_a_report_distinguishes_causes(tmp_path):
     from ruedo import World
 
     (tmp_path / "c.py").write_text(CAUSES)
@@ -711,7 +711,7 @@ def test_numbers_at_the_end_of_all_numbers_are_reported(results):
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_damaged_results_are_named_in_one_line(results, damage):
+def test_damaged_results_are_reported_in_one_line(results, damage):
     folder, _, run = results
     run(DAMAGE[damage])
     join, status = ("join", "--out", "joined", "other"), ("status", "--out", "other")
@@ -792,7 +792,7 @@ def test_a_controllers_error_stays_one_line_everywhere(tmp_path):
     "words",
     [("export", "-o"), ("report", "--pages", "0", "-o"), ("repeat", "2", "-o"), ("run", "--junit")],
 )
-def test_a_file_that_cannot_be_written_is_named(whole, words):
+def test_an_unwritable_file_is_reported(whole, words):
     folder, _ = whole
     done = ruedo("campaign", words[0], "c.yaml", *words[1:], "nowhere/t.csv", folder=folder, code=4)
     assert done.stderr == "ruedo: nowhere/t.csv: No such file or directory\n"
@@ -889,7 +889,7 @@ def test_comparing_with_no_results_is_reported(whole):
     assert done.stderr == "ruedo: empty holds no results of a campaign (no results.sqlite)\n"
 
 
-def test_a_control_character_in_a_parameter_is_no_part_of_xml(folder):
+def test_control_characters_of_parameters_are_escaped_in_xml(folder):
     text = CAMPAIGN.replace("bold: [false, true]", 'bold: ["\\a"]')
     (folder / "c.yaml").write_text(text)
     ruedo("campaign", "run", "c.yaml", "--quiet", "--junit", "r.xml", folder=folder, code=1)

@@ -243,7 +243,7 @@ def test_names_that_a_world_lacks_are_reported_before_the_first_run(folder, line
         Campaign(folder / "c.yaml").run(workers=1)
 
 
-def test_the_command_line_says_it_in_one_line_with_exit_code_3(folder):
+def test_the_command_line_reports_it_in_one_line_with_exit_code_3(folder):
     (folder / "c.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: x"))
     done = ruedo("campaign", "run", "c.yaml", folder=folder, code=3)
     assert done.stderr.count("\n") == 1 and "c.yaml:10" in done.stderr

@@ -73,7 +73,7 @@ def test_several_robots_give_several_rows_of_one_table():
     assert [(row["table"], row["robots"]) for row in rows] == [("lcm", 3)]
 
 
-def test_a_table_that_cannot_be_measured_is_named_and_the_others_go_on():
+def test_a_failed_table_is_reported_and_the_others_continue():
     result = bench(
         "--only",
         "robots",
@@ -90,7 +90,7 @@ def test_a_table_that_cannot_be_measured_is_named_and_the_others_go_on():
     assert "messages encoded and counted" in result.stdout and "1" in result.stdout
 
 
-def test_wrong_arguments_say_what_is_allowed():
+def test_errors_of_arguments_list_the_allowed_values():
     assert bench("--robots", "0").returncode == 2
     wrong = bench("--only", "robot")
     assert wrong.returncode == 2 and "latency" in wrong.stderr
@@ -113,7 +113,7 @@ def test_help_is_that_of_the_program_that_measures(command):
     )
 
 
-def test_wrong_options_are_named():
+def test_unknown_options_are_reported():
     result = bench("--robts", "3")
     assert result.returncode == 2 and "did you mean '--robots'" in result.stderr
 
@@ -131,7 +131,7 @@ def children_of(process: int) -> list[int]:
 
 
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGKILL])
-def test_nothing_goes_on_when_it_is_ended(told):
+def test_nothing_continues_after_its_end(told):
     """One process measures, and with latency that has a client in another."""
     with subprocess.Popen(
         [RUEDO, "bench", "--only", "latency", "--duration", "1e4", "--lcm", "memq://"],

@@ -278,7 +278,7 @@ NOT_SERVED = [
 ]
 
 
-def test_every_kind_of_sensor_is_served_or_named(tmp_path):
+def test_every_kind_of_sensor_is_served_or_reported(tmp_path):
     kinds = SERVED + NOT_SERVED
     sensors = "\n".join(
         f"<sensor name='s{i}' type='{kind}'><update_rate>10</update_rate></sensor>"

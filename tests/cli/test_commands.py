@@ -63,13 +63,13 @@ def one_line(text):
         (["check", "/nowhere.sdf"], 3, ""),
     ],
 )
-def test_says_what_is_wrong(arguments, code, words):
+def test_reports_errors(arguments, code, words):
     result = ruedo(*arguments)
     assert result.returncode == code, result.stderr
     assert words in result.stderr
 
 
-def test_a_world_by_name_is_no_file_that_would_be_lost():
+def test_a_world_by_name_is_not_overwritten():
     """`ruedo map rooms -o rooms` blamed a file rooms, which is not there."""
     result = ruedo("map", "rooms", "-o", "rooms")
     assert result.returncode == 2 and "'rooms': the name ends in .yaml" in result.stderr

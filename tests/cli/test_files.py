@@ -50,7 +50,7 @@ def test_import_of_a_bitmap_needs_its_size(tmp_path):
     assert sdf.count("<collision") == 2
 
 
-def test_import_says_what_is_left_out(tmp_path):
+def test_import_reports_left_out_elements(tmp_path):
     (tmp_path / "lab.map").write_text("2D-Map\nCairn: Goal 0 0 0\nLINES\n0 0 1000 0\nDATA\n")
     done = ruedo("import", tmp_path / "lab.map", "-o", tmp_path / "lab.sdf")
     assert done.stdout.endswith("lab.sdf: 1 walls; left out: 1 Goal\n")
@@ -137,7 +137,7 @@ def test_absolute_paths_are_let_in_by_the_user_only(tmp_path):
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become a user without rights")
-def test_a_file_without_permission_is_named(tmp_path):
+def test_an_unreadable_file_is_reported(tmp_path):
     """Root may read everything, so this runs as an ordinary user."""
     world = Path("/tmp") / f"ruedo-denied-{os.getpid()}.sdf"
     world.write_text("<sdf version='1.9'/>")

@@ -149,7 +149,7 @@ def test_a_robot_stands_on_the_surface_and_its_scanner_sees_it(large):
     assert seen > 30
 
 
-def test_what_is_too_large_ends_the_run(tmp_path):
+def test_a_heightmap_that_is_too_large_ends_the_run(tmp_path):
     world = hills(tmp_path, 33)
     (tmp_path / "hills.png").write_bytes(b"P5 9000 16 255\n" + bytes(9000 * 16))
     done = run("run", world, "--rate", "max", "--duration", 1)

@@ -46,7 +46,7 @@ def written(tmp_path):
     return path
 
 
-def test_a_log_says_what_it_holds(written):
+def test_info_lists_the_contents_of_a_log(written):
     told = as_json(written)
     assert told["size"] == told["readable"] == written.stat().st_size
     assert told["whole"] and told["fault"] == "" and told["messages"] == 105

@@ -141,7 +141,7 @@ def test_changes_in_lockstep_repeat_and_verify(tmp_path, clients):
     assert "repeated byte for byte" in verified.stdout
 
 
-def test_lockstep_goes_on_from_a_snapshot(tmp_path):
+def test_lockstep_continues_from_a_snapshot(tmp_path):
     def drive(simulation, steps):
         robot = simulation.robot("p3at")
         return [simulation.step(1, [robot.velocity_command(0.3, 0.2)]) for _ in range(steps)]
@@ -267,7 +267,7 @@ def touch_up(path):
 
 
 @pytest.mark.parametrize("changed", ["part.obj", "part.mtl", "part.png"])
-def test_a_changed_mesh_is_named_first(tmp_path, changed):
+def test_a_changed_mesh_is_reported_first(tmp_path, changed):
     (tmp_path / "part.obj").write_text(OBJ)
     (tmp_path / "part.mtl").write_text("newmtl m\nKd 1 0 0\nmap_Kd part.png\n")
     (tmp_path / "part.png").write_bytes(b"no picture, but a file")
@@ -296,7 +296,7 @@ def test_a_changed_mesh_is_named_first(tmp_path, changed):
     assert changed in result.stderr and "was changed since" in result.stderr
 
 
-def test_a_changed_mesh_of_a_spawned_model_is_named(tmp_path):
+def test_a_changed_mesh_of_a_spawned_model_is_reported(tmp_path):
     world, log = tmp_path / "w.sdf", tmp_path / "log.lcm"
     world.write_text(
         "<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include></world></sdf>"

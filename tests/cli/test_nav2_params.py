@@ -141,7 +141,7 @@ def test_robots_of_a_fleet_have_topics_of_their_own():
         ([], "ROBOT"),
     ],
 )
-def test_what_has_no_parameters_is_an_error(words, text):
+def test_missing_parameters_are_an_error(words, text):
     done = ruedo(*words)
     assert text in done.stderr and done.stdout == ""
     assert done.returncode == 2

@@ -91,7 +91,7 @@ NAMES = ("verify", "export", "bag", "diff", "map", "import", "check", "render", 
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_says_how_far_it_is(name, commands):
+def test_it_reports_its_progress(name, commands):
     words, what = commands[name]
     code, said = on_terminal(*words)
     assert code == 0, said
@@ -146,7 +146,7 @@ def test_a_run_has_its_own_line():
     assert program(*words, "--quiet").stderr == ""
 
 
-def test_the_way_to_a_snapshot_says_how_far_it_is(log, tmp_path):
+def test_a_resimulation_reports_its_progress(log, tmp_path):
     """A stranger's may be hours away: what is left is told, and a signal ends it."""
     data = bytearray(log.read_bytes())
     end = data.rindex(b"ruedo/state_hash") + len("ruedo/state_hash")

@@ -25,7 +25,7 @@ def regress(*options, golden="g.lcm"):
     return program("regress", "w.sdf", *RUN, "run.lcm", "--golden", golden, *options)
 
 
-def test_a_golden_log_that_is_cut_is_no_pass(folder):
+def test_a_truncated_golden_log_does_not_pass(folder):
     """In its last event, which left all others to be the same."""
     golden = folder / "g.lcm"
     for size in golden.stat().st_size - 5, golden.stat().st_size // 2 - 5:
@@ -36,7 +36,7 @@ def test_a_golden_log_that_is_cut_is_no_pass(folder):
 
 
 @pytest.mark.parametrize("value", ["1", "true", "YES", "on", "0", "False", "no", "OFF", ""])
-def test_the_environment_renews_when_it_says_so(folder, monkeypatch, value):
+def test_the_environment_variable_renews(folder, monkeypatch, value):
     before = (folder / "g.lcm").read_bytes()
     monkeypatch.setenv("RUEDO_RENEW", value)
     done = regress("--spawn", "p3at:other@3,0")
@@ -46,7 +46,7 @@ def test_the_environment_renews_when_it_says_so(folder, monkeypatch, value):
     assert ((folder / "g.lcm").read_bytes() != before) == renewed
 
 
-def test_another_word_in_the_environment_is_refused(folder, monkeypatch):
+def test_another_value_of_the_variable_is_refused(folder, monkeypatch):
     monkeypatch.setenv("RUEDO_RENEW", "nope")
     done = regress()
     assert done.returncode == 2, done
@@ -106,7 +106,7 @@ def test_a_failure_comes_before_the_findings_and_names_its_files(folder):
     ("option", "file"),
     [("--golden", "run.lcm.kept"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
 )
-def test_what_a_run_leaves_beside_its_log_is_nobody_elses(folder, option, file):
+def test_files_that_the_run_writes_itself_are_refused(folder, option, file):
     """Before, a golden log of this name was written over, and the run held to itself."""
     (folder / file).write_text("kept")
     done = regress(option, file) if option != "--golden" else regress(golden=file)
@@ -165,7 +165,7 @@ def test_a_run_without_what_the_golden_log_holds_differs(folder):
     assert done.returncode == 1 and "messages of p3at/pose are missing" in done.stderr, done
 
 
-def test_a_golden_log_that_is_missing_is_named(folder):
+def test_a_missing_golden_log_is_reported(folder):
     done = regress("--client", "true", "--lockstep", "1", golden="none.lcm")
     assert done.returncode == 1, done
     assert "FAILED: there is no golden log none.lcm yet" in done.stderr
@@ -181,7 +181,7 @@ def test_a_rule_for_no_channel_is_pointed_out(folder):
 
 
 @pytest.mark.parametrize("pattern", ["*", "p3at/pose"])
-def test_nothing_left_to_compare_is_no_pass(folder, pattern):
+def test_an_empty_comparison_does_not_pass(folder, pattern):
     done = regress("--ignore", pattern)
     assert done.returncode == 2 and "--ignore leaves nothing to compare" in done.stderr, done
 
@@ -220,7 +220,7 @@ def test_clearance_is_exact(tmp_path, monkeypatch, gap, asked, told):
         assert metrics["clearance_m"] == pytest.approx(gap, abs=1e-5)
 
 
-def test_a_run_that_goes_on_may_last_longer_than_the_timeout(tmp_path):
+def test_a_run_that_advances_may_last_longer_than_the_timeout(tmp_path):
     (tmp_path / "w.sdf").write_text(WORLD)
     options = ["--no-page", "--disable", "p3at/camera", "--rate", "1", "--duration", "1.5"]
     done = program("regress", "w.sdf", *options, "--timeout", "0.4", "--no-contact", cwd=tmp_path)
@@ -236,7 +236,7 @@ def test_a_client_that_ends_before_the_first_step_ends_the_run_after_it(folder):
     assert done.returncode == 0 and "passed" in done.stdout, done
 
 
-def test_a_disk_that_is_full_is_no_pass(folder):
+def test_a_full_disk_does_not_pass(folder):
     (folder / "run.lcm.kept").unlink(missing_ok=True)
     (folder / "run.lcm.kept").symlink_to("/dev/full")
     done = regress("--keep", "p3at/*")

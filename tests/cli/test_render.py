@@ -177,7 +177,7 @@ def frames_of(video, width, height):
     return np.frombuffer(raw, np.uint8).reshape(-1, height, width, 3).astype(int)
 
 
-def test_what_clients_drew_is_in_a_video(tmp_path):
+def test_a_video_has_the_drawings_of_clients(tmp_path):
     """Seen from straight above: up in the picture is x, left is y."""
     import ruedo
 
@@ -266,7 +266,7 @@ def test_picture_of_a_camera(tmp_path):
         (["-o", "x.png", "--cut", "low"], 2, "--cut low: allowed are a height in m, auto and none"),
     ],
 )
-def test_says_what_is_wrong(arguments, code, words):
+def test_reports_errors(arguments, code, words):
     result = render(ARENA, *arguments)
     assert result.returncode == code, result.stderr
     assert words in result.stderr
@@ -293,7 +293,7 @@ def test_says_what_is_wrong(arguments, code, words):
         (["x.mp4", "--from", "nan"], 3, "--from nan: the log has 0 to 2 s"),
     ],
 )
-def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
+def test_reports_errors_of_a_video(log, tmp_path, arguments, code, words):
     earlier = tmp_path / "x.mp4"
     earlier.write_bytes(b"an earlier video")
     result = subprocess.run(

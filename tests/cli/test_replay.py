@@ -148,7 +148,7 @@ def test_plays_again(tmp_path, exchange, stock):
         listener.end()
 
 
-def test_play_beside_a_server_says_so(tmp_path):
+def test_play_warns_about_a_server_at_its_address(tmp_path):
     """Clients would not know whose messages they see."""
     record(tmp_path / "a.lcm", seconds=1)
     world = tmp_path / "empty.sdf"
@@ -395,7 +395,7 @@ def test_an_unmodified_controller_runs_repeatably(tmp_path, bot_core):
     assert program("verify", logs[0]).returncode == 0
 
 
-def test_a_controller_that_dies_is_said(bot_core):
+def test_a_controller_that_dies_is_reported(bot_core):
     controller = start_controller(bot_core, 7833)
     server = Server(7833, *WAITING)
     assert controller.stdout.readline() == "a second of scans\n"

@@ -182,5 +182,5 @@ def test_all_threads_are_within(place, options):
             os.close(end)
 
 
-def test_the_doctor_tells(place):
+def test_the_doctor_reports_it(place):
     assert "sandbox" in ruedo(place, "doctor").stdout

@@ -141,7 +141,7 @@ def test_nohup_outlives_its_terminal(tmp_path):
     assert "Hangup" not in said.read_text()
 
 
-def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
+def test_a_pipe_without_a_reader_leaves_a_complete_log(tmp_path):
     world, log = tmp_path / "w.sdf", tmp_path / "run.lcm"
     world.write_text(EMPTY)
     read, write = os.pipe()
@@ -155,7 +155,7 @@ def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
     verified(log, world)
 
 
-def test_who_has_read_its_first_line_may_end_it(tmp_path):
+def test_a_run_may_be_ended_after_its_first_line(tmp_path):
     world, log = tmp_path / "w.sdf", tmp_path / "run.lcm"
     world.write_text(EMPTY)
     # The page is opened between the first line and the first step.
@@ -177,7 +177,7 @@ def heeds_interrupts(process):
     return int(caught.split()[1], 16) >> (signal.SIGINT - 1) & 1
 
 
-def test_what_is_due_in_centuries_is_waited_for(tmp_path):
+def test_a_message_due_in_centuries_is_waited_for(tmp_path):
     """A time that no clock can say is not the past: nothing is played at once instead."""
     log = tmp_path / "two.lcm"
     events = lcm.EventLog(str(log), "w")
@@ -216,7 +216,7 @@ def processes_that_name(path):
 
 @pytest.mark.parametrize("shown", ["nothing", "progress"])
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
-def test_while_a_mesh_is_imported_nothing_is_left(told, shown, tmp_path):
+def test_an_interrupted_mesh_import_leaves_nothing(told, shown, tmp_path):
     """Neither the importer's process nor a file, nor the socket's name."""
     mesh = tmp_path / "large.obj"
     temporary = tmp_path / "tmp"

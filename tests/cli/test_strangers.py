@@ -115,7 +115,7 @@ def ten_seconds():
 
 
 @pytest.mark.parametrize("kind", ["outside", "deep", "deep and many", "long", "many"])
-def test_what_a_log_names_costs_little(recorded, kind, tmp_path):
+def test_files_of_a_logs_header_cost_little(recorded, kind, tmp_path):
     """A file of 3 GB outside the folders that a log reaches, by a path that leads out or by a link,
     is not hashed; nor is one name looked for at each of thousands of places."""
     folder, _ = recorded
@@ -321,7 +321,7 @@ def three_gigabytes():
     ],
 )
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_limits_of_the_shell_are_named(kind, value, words, command, recorded):
+def test_limits_of_the_shell_are_reported(kind, value, words, command, recorded):
     result = program(
         command, recorded[0] / "w.sdf", preexec_fn=lambda: resource.setrlimit(kind, (value, value))
     )

@@ -39,7 +39,7 @@ def shell(line, *arguments):
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
-def test_a_closed_stream_is_no_file_of_ours(world, log, tmp_path, closed):
+def test_a_closed_standard_stream_is_not_reused_for_a_file(world, log, tmp_path, closed):
     """The next file that is opened would take its number, and what is printed would go there."""
     other = tmp_path / "other.lcm"
     assert shell(closed, "run", world, *RUN, "--record", other).returncode == 0
@@ -110,7 +110,7 @@ def test_a_file_size_limit_is_a_full_disk(world, tmp_path):
 
 
 @pytest.mark.parametrize("option", ["--record", "--restore", "--snapshots", "--lcm", "--types"])
-def test_an_empty_variable_is_no_value(world, option):
+def test_an_empty_variable_counts_as_unset(world, option):
     result = program("run", world, "--quiet", *RUN[:-2], option, "")
     assert result.returncode == 2 and option in result.stderr, result
     assert "an empty value is not allowed" in result.stderr
@@ -166,7 +166,7 @@ def test_no_command_overwrites_its_input(world, log, tmp_path):
         assert "is the same file as" in program("diff", log, log, *two).stderr
 
 
-def test_what_is_printed_into_a_file_leaves_the_rest_of_it(log):
+def test_output_into_a_file_leaves_the_rest_of_it(log):
     line = "--junit /dev/stdout"
     together = f'(echo before; "$0" "$@" {line}; echo after) > all; cat all'
     done = subprocess.run(
@@ -201,7 +201,7 @@ def made_of_files(world):
     return world
 
 
-def test_nothing_is_written_over_what_is_read_without_being_named(made_of_files, tmp_path):
+def test_outputs_never_overwrite_inputs(made_of_files, tmp_path):
     world, log = made_of_files, tmp_path / "many.lcm"
     assert program("run", world, "--quiet", *RUN, "--record", log).returncode == 0
     (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
@@ -366,7 +366,7 @@ def test_existing_files_outlive_a_full_disk(world, log, tmp_path, name, argument
     assert "No space left on device" in result.stderr
 
 
-def test_what_is_written_anew_keeps_its_link_and_its_mode(world, tmp_path):
+def test_a_rewritten_file_keeps_its_link_and_its_mode(world, tmp_path):
     target, link = tmp_path / "p.png", tmp_path / "link.png"
     target.write_bytes(b"old")
     target.chmod(0o640)

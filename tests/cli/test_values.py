@@ -182,7 +182,7 @@ WALL = "<model name='wall'><static>true</static><link name='l'><collision name='
 
 
 @pytest.mark.parametrize("x, stuck", [(0.2, True), (3, False)])
-def test_a_robot_that_stands_in_a_wall_is_named(x, stuck, tmp_path):
+def test_a_robot_in_a_wall_is_reported(x, stuck, tmp_path):
     file = tmp_path / "w.sdf"
     file.write_text(
         world(WALL + f"\n<include><uri>model://p3at</uri><pose>{x} 0 0 0 0 0</pose></include>"),
@@ -262,7 +262,7 @@ def of_a_sensor(words, folder):
         ),
     ],
 )
-def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
+def test_regress_refuses_options_without_effect(options, text, tmp_path):
     done = of_a_sensor(f"regress w.sdf --record a.lcm --duration 0.1 {options}", tmp_path)
     assert done.returncode == 2 and text in done.stderr, done.stderr
     assert not (tmp_path / "a.lcm").exists()  # told before the run, which may take hours
@@ -277,7 +277,7 @@ def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
         ("--ros2-services fastrtps", "--ros2"),
     ],
 )
-def test_run_takes_nothing_that_does_nothing(option, other, tmp_path):
+def test_run_refuses_options_without_effect(option, other, tmp_path):
     done = of_a_sensor(f"run w.sdf --lcm memq:// --duration 0 {option}", tmp_path)
     assert done.returncode == 2, done
     assert f"{option.split()[0]} requires {other}" in done.stderr, done

@@ -148,7 +148,7 @@ def test_another_command_is_another_run(driven, tmp_path):
     assert program("verify", tmp_path / "less.lcm").returncode == 1
 
 
-def test_a_changed_file_is_named_first(tmp_path):
+def test_a_changed_file_is_reported_first(tmp_path):
     world = tmp_path / "arena.sdf"
     text = Path(ARENA).read_text() + "<!-- mine: Ruedo's own would be found by its hash -->\n"
     world.write_text(text)
@@ -185,7 +185,7 @@ def test_a_log_of_another_installation_that_is_still_there(tmp_path):
     assert done.returncode == 0 and "byte for byte" in done.stdout, done.stderr
 
 
-def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
+def test_another_machine_is_reported_first_as_the_cause(tmp_path):
     found = record(tmp_path / "a.lcm", seconds=1)
     header = log_header_t.decode(found[0][2])
     header.cpu, header.libc = "aarch64", "glibc 2.19"
@@ -211,7 +211,7 @@ def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
     assert result.stdout.startswith("not as in the log: ") and "may be the cause" in result.stdout
 
 
-def test_another_cpu_or_c_library_is_no_excuse(tmp_path):
+def test_another_cpu_or_c_library_must_verify(tmp_path):
     found = record(tmp_path / "a.lcm", seconds=1)
     header = log_header_t.decode(found[0][2])
     header.cpu, header.libc = "x86-64 sse4.2", "glibc 2.19"
@@ -270,7 +270,7 @@ def test_a_full_disk(tmp_path):
     )
 
 
-def test_a_header_alone_is_no_run_that_was_repeated(tmp_path):
+def test_a_log_with_only_a_header_does_not_verify(tmp_path):
     found = record(tmp_path / "a.lcm", seconds=1)
     log = tmp_path / "header.lcm"
     write(log, found[:1])
@@ -291,7 +291,7 @@ def test_a_log_that_is_damaged_after_the_runs_end_is_not_whole(tmp_path):
     assert result.returncode == 1 and "not verified to the end: cut off" in result.stdout, result
 
 
-def test_another_build_of_the_same_sources_is_no_excuse(tmp_path):
+def test_another_build_of_the_same_sources_must_verify(tmp_path):
     """The linker gives each program of a build another id."""
     found = record(tmp_path / "a.lcm", seconds=1)
     header = log_header_t.decode(found[0][2])

@@ -481,7 +481,7 @@ def test_maps_give_the_same_in_each_language(language):
     assert said.words("grown") == ["True", "False"]
 
 
-def test_who_begins_to_listen_while_a_sample_comes_gets_the_next(monkeypatch):
+def test_a_subscription_during_a_sample_gets_the_next_one(monkeypatch):
     """Between its decoding, for which nobody had asked, and the calls."""
     import ruedo
 

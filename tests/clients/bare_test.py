@@ -205,7 +205,7 @@ def test_a_primitive_needs_no_repeating():
         bare.until(lambda m: m.id == 77 and m.state == m.STATE_DONE and abs(m.done - 1.0) < 1e-6)
 
 
-def test_a_refused_primitive_says_why():
+def test_a_refused_primitive_has_a_reason():
     from ruedo.lcmtypes import motion_status_t, move_command_t
 
     with ruedo_run("--disable", "p3at/camera", world=HALL) as server:

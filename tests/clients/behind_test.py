@@ -70,7 +70,7 @@ def unwaited():
             server.terminate()
 
 
-def test_who_is_not_waited_for_gets_the_newest(unwaited, caplog):
+def test_a_client_without_pacing_gets_the_newest_sample(unwaited, caplog):
     url, server = unwaited
     with ruedo.connect(url, timeout=PATIENCE) as sim:
         robot, seen = sim.robot("p3at"), []

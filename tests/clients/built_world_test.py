@@ -34,7 +34,7 @@ def test_paths_people_doors_and_sensors(tmp_path):
         assert math.dist(closed.position, opened.position) > 0.9
 
 
-def test_what_is_wrong_is_said():
+def test_errors_are_reported():
     with pytest.raises(ValueError, match="at least two points"):
         ruedo.World().box(0, 0, path=[(0, 0, 0)])
     with pytest.raises(ValueError, match=r"needs \(s, x, y\)"):

@@ -155,7 +155,7 @@ def test_errors_name_what_exists(language, server):
     assert said.one("spawn").split(":")[0] in ("NotSupported", "RequestError")
 
 
-def test_what_cannot_move_sideways_is_not_told_to(language, server):
+def test_a_robot_that_cannot_move_sideways_refuses_the_command(language, server):
     """The part ahead would be lost with it."""
     said = probe(language, server.url, "sideways", "p3at")
     for what in ("command", "velocity"):
@@ -166,13 +166,13 @@ def test_what_cannot_move_sideways_is_not_told_to(language, server):
     assert said.one("none") == "none"
 
 
-def test_what_moves_sideways_is_reported_to(language):
+def test_a_robot_that_moves_sideways_accepts_the_command(language):
     with ruedo_run("--spawn", "mecanum:m@0,0", world="empty") as server:
         said = probe(language, server.url, "sideways", "m")
     assert [said.one(what) for what in ("command", "velocity", "none")] == 3 * ["none"]
 
 
-def test_what_a_robot_cannot_execute_is_refused_as_a_whole_and_told_once():
+def test_an_impossible_command_is_refused_whole_and_reported_once():
     """The server's part, for any LCM program: a misspelt joint beside a good one, and a speed to
     the side beside one ahead.
     """
@@ -251,7 +251,7 @@ def test_paused_simulation_is_joined(language):
         assert probe(language, server.url, "list").words("world")[0] == "hall"
 
 
-def test_who_joins_a_run_or_restores_one_sleeps_as_long_as_asked(language, tmp_path):
+def test_sleep_lasts_its_time_after_a_join_or_a_restore(language, tmp_path):
     """The client's clock stood at 0 until the first tick, which then counted as slept."""
     options = ("--disable", "p3at/camera", "--snapshots", str(tmp_path))
     with ruedo_run(*options, world=HALL) as server:

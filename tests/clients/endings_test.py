@@ -120,7 +120,7 @@ def test_a_run_that_is_stopped_has_ended(language, tmp_path, how):
     assert said.startswith("RunEnded: the run has ended at step "), said
 
 
-def test_a_server_that_is_killed_has_said_nothing(language, tmp_path):
+def test_a_killed_server_is_reported_as_silent(language, tmp_path):
     with over_unix(tmp_path) as server:
         said = while_it_sleeps(language, server, server.process.kill)
     assert said.startswith("NoServer: nothing was heard"), said
@@ -141,7 +141,7 @@ def test_a_callbacks_fault_counts_in_a_regression_run_that_ends(language, tmp_pa
 
 
 @pytest.mark.parametrize("call", ["wait", "sleep"])
-def test_a_call_says_why_sim_time_stands_still(language, tmp_path, call):
+def test_a_call_reports_why_sim_time_stands_still(language, tmp_path, call):
     with over_unix(tmp_path, "--paused") as server:
         _, said, errors = ended(language, server.url, "stands", call)
     why = "the simulation is paused"

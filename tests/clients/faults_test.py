@@ -56,7 +56,7 @@ def test_each_request_acts_exactly_once(loss: float, tmp_path: Path) -> None:
     assert kinds == [request_t.SPAWN] * 12 + [request_t.REMOVE] * 6
 
 
-def test_a_stopped_server_goes_on_from_where_it_was() -> None:
+def test_a_stopped_server_continues_from_its_state() -> None:
     """It does not race to catch up, says what happened, and blames no client: the lease is shorter
     than the stop.
     """

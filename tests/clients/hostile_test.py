@@ -32,7 +32,7 @@ def fake(*options):
     return server
 
 
-def test_no_server_is_said_within_two_seconds_with_the_url(language):
+def test_a_missing_server_is_reported_within_two_seconds_with_the_url(language):
     url = free_url()
     start = time.monotonic()
     said = probe(language, url, "connect").one("failed")
@@ -48,7 +48,7 @@ def test_no_server_is_said_within_two_seconds_with_the_url(language):
 
 
 @pytest.mark.parametrize("url", ["http://example.org", "nonsense", "udpm://239.255.76.67:notaport"])
-def test_a_url_that_is_none_is_refused(language, url):
+def test_a_malformed_url_is_refused(language, url):
     assert probe(language, url, "connect").one("failed").startswith("NoServer: ")
 
 
@@ -57,7 +57,7 @@ def test_nothing_listens_on_a_tcp_port(language):
     assert said.startswith("NoServer: ") and "tcpq://127.0.0.1:9" in said and "ruedo doctor" in said
 
 
-def test_a_server_of_another_version_is_named(language):
+def test_a_server_of_another_version_is_reported(language):
     with fake("--wrong-info") as server:
         said = probe(language, server.url, "list").one("failed")
     assert said.startswith(
@@ -85,7 +85,7 @@ def test_good_samples_come_through(language):
         assert probe(language, server.url, "streams", "p3at", "60", "0").one("lrf") == "none"
 
 
-def test_a_pause_is_named_as_the_reason_of_silence(language):
+def test_a_pause_is_reported_as_the_reason_of_silence(language):
     with fake("--paused") as server:
         assert "paused" in probe(language, server.url, "streams", "p3at", "60", "0.3").one(
             "odometry"
@@ -121,19 +121,19 @@ def stream_url(request, tmp_path):
 
 
 @pytest.mark.parametrize("sent", STUCK.values(), ids=STUCK.keys())
-def test_a_message_that_never_ends_holds_nobody_up(language, stream_url, sent):
+def test_an_endless_message_delays_no_other(language, stream_url, sent):
     with LyingStream(stream_url, sent):
         said = probe(language, stream_url, "streams", "p3at", "0.3", "0.3")
     assert said.one("lrf").startswith("Timeout: ") and said.one("odometry").startswith("Timeout: ")
 
 
-def test_a_length_that_lies_is_not_waited_for(language, stream_url):
+def test_a_forged_length_is_not_waited_for(language, stream_url):
     with LyingStream(stream_url, HELLO + INFO + frame("x", bytes(100), size=(1 << 32) - 1)):
         probe(language, stream_url, "connect")
 
 
 @pytest.mark.parametrize("sent", [b"", HELLO[:5], bytes(8) + INFO])
-def test_who_says_no_hello_is_no_server(language, stream_url, sent):
+def test_a_peer_without_a_hello_is_not_a_server(language, stream_url, sent):
     with LyingStream(stream_url, sent):
         said = probe(language, stream_url, "connect").one("failed")
     assert said.startswith("NoServer: ") and stream_url in said
@@ -182,7 +182,7 @@ def test_a_primitive_that_no_status_shows_is_lost(language, stream_url):
     assert said.startswith("failed MotionError: p3at: stop ended: lost, "), said
 
 
-def test_what_a_primitive_ended_may_be_told_late(language, stream_url):
+def test_a_late_status_ends_a_primitive(language, stream_url):
     """Of one step come the end of what ran, and what runs now: datagrams may change places."""
     known = driven_info(motion="motion_status_t", move="move_command_t")
     known.features &= ~(1 << lcmtypes.request_t.GRANT)  # not in lockstep
@@ -204,7 +204,7 @@ def test_what_a_primitive_ended_may_be_told_late(language, stream_url):
 
 
 @pytest.mark.parametrize("lie", [lambda _: grants_and_huge_ticks, grants_and_ever_new_infos])
-def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_url):
+def test_messages_in_lockstep_take_bounded_memory(lie, language, stream_url):
     driven = driven_info(pose="pose_t", velocity="velocity_command_t", tick="tick_t")
     known = HELLO + frame("ruedo/info", driven.encode())
     with LyingStream(stream_url, known, lie(driven)) as server:

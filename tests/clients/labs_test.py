@@ -136,7 +136,7 @@ INNER = [(-3.15, -2.15), (3.15, -2.15), (3.15, 2.15), (-3.15, 2.15)]
         (along((-3, -1), (3, -1), (3, 1), (-3, 1)), "m from the wall, not 0.8"),
     ],
 )
-def test_who_follows_a_wall_goes_on(way, text):
+def test_the_wall_following_lab_judges_programs(way, text):
     said = why_not("wall_following", way)
     assert text in said and bool(text) == bool(said)
 
@@ -150,6 +150,6 @@ def test_who_follows_a_wall_goes_on(way, text):
         (along(*[(0, 0), (1, 0)] * 8), "its farthest places are 1.0 m from each other"),
     ],
 )
-def test_who_avoids_what_is_near_gets_around(way, text):
+def test_the_avoidance_lab_judges_programs(way, text):
     said = why_not("sonar_avoidance", way)
     assert text in said and bool(text) == bool(said)

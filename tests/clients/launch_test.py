@@ -106,7 +106,7 @@ def test_two_launches_do_not_meet(language):
     assert gone(url) and gone(other)
 
 
-def test_what_the_server_says_is_in_the_error(language, tmp_path):
+def test_the_error_has_the_servers_message(language, tmp_path):
     wrong = tmp_path / "wrong.sdf"
     wrong.write_text("<sdf version='1.9'>\n<world name='w'>\n")
     said = probe(language, "-", "launch", str(wrong)).one("failed")
@@ -148,7 +148,7 @@ def test_python_in_a_thread_that_ends():
         assert times == sorted(set(times))
 
 
-def test_a_server_that_dies_is_said():
+def test_a_server_that_dies_is_reported():
     import ruedo
 
     with ruedo.launch(HALL, args=["--disable", "p3at/camera"]) as sim:

@@ -116,7 +116,7 @@ def test_a_callback_of_a_new_run_may_close_the_simulation():
 
 
 @pytest.mark.parametrize("server", [ruedo_run, tcp_server])
-def test_what_cannot_be_described_ends_nothing(server):
+def test_an_exception_without_a_text_ends_nothing(server):
     """The thread that receives lives, over each of LCM's networks."""
     with server("--disable", "p3at/camera", world=HALL) as running:
         done = run([*COMMAND, running.url, "unspeakable"])
@@ -162,7 +162,7 @@ def runtime():
         assert time.monotonic() < deadline
 
 
-def test_an_interrupted_launch_says_so_and_leaves_nothing(runtime):
+def test_an_interrupted_launch_reports_it_and_leaves_nothing(runtime):
     folder, environment = runtime
     text = Path(HALL).read_text()
     done = run([*COMMAND, HALL, "interrupted_launch", text], env=environment)
@@ -215,7 +215,7 @@ def test_the_newest_info_holds():
     ]
 
 
-def test_monitors_that_a_user_holds_hold_nothing_up():
+def test_monitors_held_by_a_user_block_nothing():
     assert internals("monitors") == ["received true true true"]
 
 
@@ -294,7 +294,7 @@ def test_a_primitive_is_sent_until_a_status_shows_it():
     assert internals("resends") == ["again true"] * 4 + ["shown true"]
 
 
-def test_a_server_is_reported_how_far_its_client_has_come():
+def test_a_client_reports_its_progress_to_its_server():
     assert internals("progress") == [
         "began true",
         "waited for true true",

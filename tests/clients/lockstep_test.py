@@ -145,7 +145,7 @@ def test_messages_are_those_of_the_robots_that_were_there(language):
     ]
 
 
-def test_who_comes_later_sees_the_state_that_stands(language, tmp_path):
+def test_a_later_viewer_sees_the_current_state(language, tmp_path):
     """Joining a run that is under way, and one that begins with a snapshot."""
     import ruedo
 
@@ -198,7 +198,7 @@ def test_commands_ahead_go_with_their_robot(tmp_path):
 
 
 @pytest.mark.parametrize("visit", ["visited", "leaves"])
-def test_who_leaves_is_not_waited_for_whatever_is_lost(visit, language, tmp_path):
+def test_a_leaving_client_is_not_waited_for_despite_losses(visit, language, tmp_path):
     """The LEAVE is lost, once, at the end or in a callback. The lease is longer than the test, in
     which another client goes on.
     """
@@ -309,7 +309,7 @@ def times_out(sim, steps, says):
             steps = 0
 
 
-def test_waiting_says_for_whom():
+def test_waiting_reports_the_missing_client():
     import ruedo
 
     with (
@@ -373,7 +373,7 @@ def test_the_run_ends_when_all_have_everything():
         assert server.process.wait(PATIENCE) == 0
 
 
-def test_a_reset_begins_anew():
+def test_a_reset_equals_a_fresh_run():
     import ruedo
 
     with (
@@ -403,7 +403,7 @@ def test_the_program_of_the_docs():
     assert said[0].stdout == said[1].stdout
 
 
-def test_what_a_newcomer_calls_before_the_first_step_is_answered():
+def test_calls_before_the_first_step_are_answered():
     import ruedo
 
     with (
@@ -426,7 +426,7 @@ def test_what_a_newcomer_calls_before_the_first_step_is_answered():
         sim.quit()
 
 
-def test_a_pause_in_lockstep_is_named_by_who_waits():
+def test_a_waiting_call_reports_a_pause_in_lockstep():
     import ruedo
 
     with (

@@ -124,7 +124,7 @@ def test_a_message_that_no_run_sends_is_damage(language, log, tmp_path):
         assert said.one("fault") == f"it is damaged at byte {len(data)}"
 
 
-def test_what_is_no_log_is_said(language, tmp_path):
+def test_a_file_that_is_not_a_log_is_refused(language, tmp_path):
     text = tmp_path / "text.lcm"
     text.write_text("this is not a log, but a text that is longer than the head of an event\n")
     for path in (text, tmp_path, tmp_path / "nothing.lcm"):
@@ -138,7 +138,7 @@ def test_what_is_no_log_is_said(language, tmp_path):
             assert "failed " in result.stdout, result
 
 
-def test_a_fifo_is_no_log_and_not_waited_for(language, tmp_path):
+def test_a_fifo_is_refused_as_a_log_at_once(language, tmp_path):
     os.mkfifo(tmp_path / "fifo")
     done = subprocess.run(
         [*PROBES[language], "-", "log", str(tmp_path / "fifo")],
@@ -149,7 +149,7 @@ def test_a_fifo_is_no_log_and_not_waited_for(language, tmp_path):
     assert "fifo" in done.stdout + done.stderr
 
 
-def test_read_log_says_what_is_no_log(tmp_path):
+def test_read_log_refuses_a_file_that_is_not_a_log(tmp_path):
     ruedo = pytest.importorskip("ruedo")
     pytest.importorskip("pandas")
     path = tmp_path / "noise.bin"
@@ -238,7 +238,7 @@ def test_columns_of_a_log(tmp_path):
         log.columns("nobody")
 
 
-def test_a_message_of_another_type_or_none_is_left_out(tmp_path):
+def test_messages_that_do_not_decode_are_left_out(tmp_path):
     ruedo = pytest.importorskip("ruedo")
     [(_, _, pose), (_, _, joints), *_] = all_kinds()
     bad = [pose[:-1], pose + b"x", joints, b"", pose[:3]]

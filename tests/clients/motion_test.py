@@ -12,7 +12,7 @@ def motion():
     return Motion(None, "p3at", 7, "advance", 2.0)
 
 
-def test_its_text_says_how_far_it_got_and_why_it_ended():
+def test_its_text_has_the_progress_and_the_reason():
     m = motion()
     assert repr(m) == "<Motion advance of p3at: sent, 0.000 done, 2.000 remain>"
     m._update(status(7, "running", "", 0.5, 1.5))
@@ -31,7 +31,7 @@ def test_a_refused_command_leaves_what_runs():
     assert (m.state, m.reason) == ("ended", "replaced")
 
 
-def test_what_blocks_it_is_named():
+def test_the_blocking_body_is_reported():
     m = motion()
     m._update(status(7, "running", "", 0.5, 1.5), "wall/link")
     assert m.blocked_by == ""

@@ -39,7 +39,7 @@ def test_the_libraries_work_over_tcp(language):
 
 
 @pytest.mark.parametrize("url", ["udpm://239.255.76.67", "udpm://:7667", "udpm://"])
-def test_what_an_address_leaves_out_is_lcms_own(language, url):
+def test_missing_parts_of_an_address_are_lcms_defaults(language, url):
     with ruedo_run("--disable", "p3at/camera", world=HALL, url="udpm://239.255.76.67:7667?ttl=0"):
         said = probe(language, url, "velocity", "p3at", "0.3", "0.2", "2")
     assert said.numbers("moved")[2] > 1.5  # s that it drove
@@ -120,7 +120,7 @@ def test_launch_needs_no_multicast(language):
 
 
 @pytest.mark.parametrize("scheme", ["udpm", "tcpq"])
-def test_a_second_server_refuses_and_names_the_first(scheme):
+def test_a_second_server_refuses_and_reports_the_first(scheme):
     with ruedo_run(*QUICK, world=HALL) if scheme == "udpm" else tcp_server(*QUICK) as first:
         second = subprocess.run(
             [RUEDO, "run", HALL, "--lcm", first.url],
@@ -221,7 +221,7 @@ def test_auto_without_multicast_is_tcp():
     )
 
 
-def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
+def test_two_hosts_that_share_an_address_both_warn(tmp_path):
     """Two network namespaces and a cable between them."""
     script = """
         ip link set lo up
@@ -269,7 +269,7 @@ def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
     assert runs[0] == runs[1][::-1]
 
 
-def test_a_message_that_fits_no_buffer_is_said_once():
+def test_a_message_larger_than_the_buffer_is_reported_once():
     buffer = int(open("/proc/sys/net/core/rmem_default").read())
     if buffer > 900_000:
         pytest.skip(f"receive buffers of {buffer} bytes: a raw picture fits")
@@ -299,7 +299,7 @@ def test_a_message_that_fits_no_buffer_is_said_once():
     )
 
 
-def test_doctor_names_who_serves():
+def test_doctor_reports_the_server_of_an_address():
     with ruedo_run(*QUICK, world=HALL) as server:
         done = subprocess.run(
             [RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE

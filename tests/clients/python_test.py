@@ -47,7 +47,7 @@ def scan(*ranges, utime=1):
     return samples.CONVERSIONS["planar_lidar_t"][1](message)
 
 
-def test_what_is_sent_by_multicast_reaches_lcm():
+def test_multicast_messages_reach_lcm():
     """Of any size, around the largest datagram, of which "A/1" and its 0 take four bytes."""
     url = f"{free_url()}&recv_buf_size=8388608"
     heard, bus = [], lcm.LCM(url)
@@ -98,7 +98,7 @@ def filled(message_type):
 
 
 @pytest.mark.parametrize("name", [name for name in dir(ruedo.lcmtypes) if name.endswith("_t")])
-def test_a_message_that_is_cut_off_is_none(name):
+def test_a_truncated_message_does_not_decode(name):
     message_type = getattr(ruedo.lcmtypes, name)
     data = filled(message_type).encode()
     assert decode(message_type, data).encode() == data
@@ -179,12 +179,12 @@ def test_arguments_instead_of_options():
         ({"timeout": "long"}, "timeout is a number, not 'long'"),
     ],
 )
-def test_wrong_arguments_say_what_is_right(wrong, says):
+def test_errors_of_arguments_give_the_right_form(wrong, says):
     with pytest.raises(TypeError, match=says):
         ruedo.launch(HALL, **wrong)
 
 
-def test_what_is_no_world_is_said():
+def test_a_file_that_is_not_a_world_is_refused():
     for call, says in (
         (lambda: ruedo.launch(5), "world is a file, the name of a world or a World, not 5"),
         (lambda: ruedo.launch(text=5), "text is a text, not 5"),
@@ -223,7 +223,7 @@ def test_what_is_no_world_is_said():
         (lambda sim: sim.set_rate("fast"), "rate is a number, not 'fast'"),
     ],
 )
-def test_wrong_types_in_calls_say_what_is_right(call, says):
+def test_type_errors_of_calls_give_the_right_type(call, says):
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim, pytest.raises(TypeError, match=says):
         call(sim)
 
@@ -253,7 +253,7 @@ def test_a_robot_without_a_drive_has_faults():
         assert [scan.ranges.max() for scan in seen.all(robot.lrf)] == [math.inf] + 5 * [0.5]
 
 
-def test_who_waits_in_lockstep_is_reported_that_steps_are_wanted():
+def test_a_timeout_in_lockstep_advises_to_step():
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
         robot = sim.robot("p3at")
         with pytest.raises(ruedo.Timeout, match=r"in lockstep.*sim\.step\(20\)\.latest\(robot"):
@@ -389,7 +389,7 @@ class Awaited:
 @pytest.mark.parametrize(
     "callback", [coroutine, coroutines, generator, Awaited(), partial(coroutine)], ids=repr
 )
-def test_what_would_never_run_is_no_callback(callback):
+def test_a_coroutine_function_is_refused_as_a_callback(callback):
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
         robot = sim.robot("p3at")
         for register in robot.lrf.on_sample, robot.on_collision, sim.on_new_run:
@@ -398,7 +398,7 @@ def test_what_would_never_run_is_no_callback(callback):
 
 
 @pytest.mark.parametrize("made", [coroutine, generator])
-def test_what_a_callback_made_and_nothing_ran_is_a_fault(made):
+def test_an_unawaited_coroutine_of_a_callback_is_an_error(made):
     with (
         pytest.raises(TypeError, match="a callback returned .* which nothing runs"),
         ruedo.launch(HALL, lockstep=1, **QUICK) as sim,
@@ -455,7 +455,7 @@ def test_callbacks_are_taken_back_and_readers_do_not_meet():
         assert "this simulation was closed" in repr(sim)
 
 
-def test_a_server_that_was_started_anew_is_noticed():
+def test_a_restarted_server_is_noticed():
     url = free_url()
     events = []
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
@@ -586,7 +586,7 @@ class _Interrupted:
         self._end.sendall(data)
 
 
-def test_what_interrupts_a_call_may_close_the_simulation():
+def test_a_signal_handler_may_close_the_simulation():
     """The call holds locks then, that of the socket among them."""
     with ruedo.launch(HALL, **QUICK) as sim:
         sim.state()
@@ -800,7 +800,7 @@ def test_a_map_is_an_array(tmp_path):
         ),
     ],
 )
-def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
+def test_errors_of_a_malformed_map(text, says, tmp_path):
     (tmp_path / "m.pgm").write_bytes(b"P5 9 9 255\n1")
     (tmp_path / "m.yaml").write_text(text)
     with pytest.raises(ValueError, match=f"m.(yaml|pgm): {says}"):
@@ -855,7 +855,7 @@ def test_a_hostile_map_or_picture_is_refused_at_once(what, says, tmp_path):
         (b"\x89PNG\r\n\x1a\n" + b"\xff" * 50, "is not a picture that can be read"),
     ],
 )
-def test_a_broken_picture_of_a_map_is_named(picture, says, tmp_path):
+def test_a_broken_picture_of_a_map_is_reported(picture, says, tmp_path):
     if not picture.startswith(b"P5"):
         pytest.importorskip("PIL")
     (tmp_path / "m.pgm").write_bytes(picture)
@@ -942,7 +942,7 @@ WRONG = [
 ]
 
 
-def test_what_is_wrong_is_reported_in_a_line_of_our_own():
+def test_errors_are_reported_in_a_line_of_our_own():
     """Each call with each wrong argument: it is taken, or one line names what is wrong."""
     with ruedo.launch(HALL, **QUICK) as sim:
         robot, inner = sim.robot("p3at"), []
@@ -1037,7 +1037,7 @@ if sys.argv[2:]:
 @pytest.mark.parametrize(
     ("how", "what"), [([], "the program ends without it"), (["close"], "close() waits for it")]
 )
-def test_a_callback_that_does_not_return_is_named(tmp_path, how, what):
+def test_a_callback_that_does_not_return_is_reported(tmp_path, how, what):
     """The program ends, although its end waits for callbacks; close() does for ever."""
     program = tmp_path / "program.py"
     program.write_text(_NEVER_RETURNS)
@@ -1080,7 +1080,7 @@ def test_a_program_may_end_beside_a_callback_in_a_daemon_thread():
         assert done.returncode == 0, done.stderr
 
 
-def test_a_send_that_takes_long_holds_up_nobody_who_receives():
+def test_a_slow_send_delays_no_receiver():
     """Of a large request, to a server that has much else to do."""
     ends = []
 

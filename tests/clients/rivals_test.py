@@ -88,7 +88,7 @@ def test_each_answers_its_own_clients_alone(language):
     assert "another server is on this channel" in output
 
 
-def test_motions_go_on_beside_another_server(language):
+def test_motions_continue_beside_another_server(language):
     """Before, each of its signs was the beginning of a new run, which ended them."""
     with (
         ruedo_run(*QUICK, world=HALL) as first,
@@ -213,7 +213,7 @@ def flood_of_ticks(sim: ruedo.Simulation) -> Iterator[tuple[str, bytes]]:
 
 
 @pytest.mark.parametrize("flood", [flood_of_samples, flood_of_ticks])
-def test_what_never_fits_takes_no_memory(language, flood):
+def test_an_oversized_message_takes_no_memory(language, flood):
     """In lockstep, where messages wait for their ticks, and ticks for their messages."""
     command = PROBES[language]
     if language == "java":

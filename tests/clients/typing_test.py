@@ -41,7 +41,7 @@ def test_dir_has_what_a_user_should_see_and_nothing_else():
     assert not [name for name in names if name.startswith("_") and not name.startswith("__")]
 
 
-def test_what_is_seen_has_documentation():
+def test_public_names_have_documentation():
     for name in dir(ruedo):
         thing = getattr(ruedo, name)
         if inspect.isclass(thing) or inspect.isfunction(thing):

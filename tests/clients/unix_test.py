@@ -37,7 +37,7 @@ def test_lockstep_is_the_same_as_over_multicast(language, tmp_path):
     assert end[0] == str(STEPS) and end == lockstep(language)
 
 
-def test_nobody_at_the_path_is_said(language, tmp_path):
+def test_a_socket_without_a_server_is_reported(language, tmp_path):
     said = probe(language, f"unix://{tmp_path}/nobody", "connect").one("failed")
     assert said.startswith(f"NoServer: no Ruedo server at unix://{tmp_path}/nobody")
 
@@ -75,7 +75,7 @@ def anothers_socket():
         shutil.rmtree(folder)
 
 
-def test_nobody_talks_to_another_users_server(language, anothers_socket):
+def test_another_users_server_is_refused(language, anothers_socket):
     said = probe(language, f"unix://{anothers_socket}", "connect").one("failed")
     assert said.startswith("NoServer") and "served by another user" in said
 

@@ -46,7 +46,7 @@ def test_snapshots_and_the_names_of_spawned_models(language, tmp_path):
     assert last - first == 60
 
 
-def test_what_is_wrong_with_a_sensor_of_a_spawned_robot_is_reported():
+def test_errors_of_a_spawned_robots_sensor_are_reported():
     """By the server: it is made when the robot enters."""
     import ruedo
 

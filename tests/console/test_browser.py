@@ -214,7 +214,7 @@ def crash(tmp_path_factory):
     return path
 
 
-def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
+def test_the_page_jumps_to_events_of_a_log(crash, tmp_path):
     """A motion primitive, a collision, the watchdog and a fault: each at the time at which the log
     has it.
     """
@@ -292,7 +292,7 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
     } <= set(seen)
 
 
-def test_what_happens_in_a_run_is_reported(crash, tmp_path):
+def test_events_of_a_run_are_reported(crash, tmp_path):
     with running(world=crash) as process:
         seen = browse(process.url, tmp_path, "events")
     assert {
@@ -304,7 +304,7 @@ def test_what_happens_in_a_run_is_reported(crash, tmp_path):
     } <= set(seen)
 
 
-def test_the_view_tells_and_gives(tmp_path):
+def test_the_view_shows_coordinates_and_measures(tmp_path):
     with running("--disable", "p3at/camera") as process:
         seen = browse(process.url, tmp_path, "looks")
     assert {
@@ -321,7 +321,7 @@ def test_the_view_tells_and_gives(tmp_path):
     } <= set(seen)
 
 
-def test_what_robots_sense_in_space_is_shown(tmp_path):
+def test_samples_in_space_are_shown(tmp_path):
     with running(world=SOURCE / "tests/console/senses.sdf") as process:
         seen = browse(process.url, tmp_path, "senses")
     assert {
@@ -472,7 +472,7 @@ SLAB = """<sdf version="1.9"><world name="slab"><include><uri>model://sun</uri><
 </world></sdf>"""
 
 
-def test_what_goes_wrong_is_said(tmp_path):
+def test_failures_are_reported(tmp_path):
     world = tmp_path / "world.sdf"
     world.write_text(SLAB)
     with running(world=world) as process:
@@ -539,7 +539,7 @@ def test_only_what_can_be_done_is_offered(tmp_path, what):
         browse(process.url, tmp_path, "offers", {"is": what})
 
 
-def test_who_stands_is_drawn_with_all_pixels(tmp_path):
+def test_a_resting_robot_is_drawn_with_all_pixels(tmp_path):
     """Though its range finder goes on, each scan with other noise."""
     with running() as process:
         seen = browse(process.url, tmp_path, "rest")
@@ -561,7 +561,7 @@ def test_everybody_can_use_it(tmp_path):
     } <= set(seen)
 
 
-def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
+def test_the_page_loads_fast_fits_and_reports_faults(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -597,7 +597,7 @@ def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     } <= set(said)
 
 
-def test_what_is_open_is_kept_for_each_world(tmp_path):
+def test_the_open_panes_are_stored_for_each_world(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -685,7 +685,7 @@ def test_everything_is_steered(steered):
     assert [what for what in wanted if what not in seen] == []
 
 
-def test_what_was_steered_is_in_the_log(steered):
+def test_the_log_has_the_steering(steered):
     """Each command as the page was asked for it, and what the robot did: whatever the page showed,
     and how late.
     """
@@ -756,7 +756,7 @@ def test_a_recorded_run_is_scrubbed(tmp_path):
     )
 
 
-def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
+def test_the_log_has_placed_models_and_resets(steered, tmp_path):
     """The log of the steered run: a box and a robot that come on the way, and are gone after the
     reset.
     """
@@ -872,7 +872,7 @@ def draw(sim, layer, frame=""):
     sim.markers(layer, every, frame=frame)
 
 
-def test_what_clients_draw_is_shown(tmp_path):
+def test_drawings_of_clients_are_shown(tmp_path):
     """Live, to a page that comes later, too; in its past; then in the log and in a page of the log,
     at moments that the log's commands tell.
     """

@@ -258,7 +258,7 @@ def test_no_connection_becomes_many():
         "DELETE / HTTP/1.1\r\nHost: evil.example\r\nTransfer-Encoding: chunked\r\n\r\n",
     ],
 )
-def test_a_body_is_no_request(server, first):
+def test_a_request_body_is_not_read_as_a_request(server, first):
     """What another site's page may send is not taken for a request of the console's own page."""
     with socket.create_connection(("127.0.0.1", server.port), timeout=20) as one:
         one.sendall((first + page(server.port, *UPGRADE, path="/socket")).encode())
@@ -311,7 +311,7 @@ def test_viewers_change_no_byte(tmp_path):
     assert (tmp_path / "alone.lcm").read_bytes() == (tmp_path / "viewed.lcm").read_bytes()
 
 
-def test_wrong_addresses_are_said():
+def test_malformed_addresses_are_reported():
     for address, code in (("nonsense:x", 2), ("192.0.2.1:80", 4)):
         done = subprocess.run(
             [RUEDO, "run", ARENA, "--lcm", "memq://", "--view", address],

@@ -216,7 +216,7 @@ def comes_to_know(process, utime):
     viewer.close()
 
 
-def test_who_comes_late_to_a_run_that_stands_is_reported_how_it_stands(tmp_path):
+def test_a_late_client_of_a_paused_run_gets_its_state(tmp_path):
     import ruedo
 
     with running("--paused", "--disable", "p3at/camera") as process:
@@ -230,7 +230,7 @@ def test_who_comes_late_to_a_run_that_stands_is_reported_how_it_stands(tmp_path)
 
 
 @needs_browser
-def test_a_changed_file_is_asked_about(tmp_path):
+def test_saving_over_a_changed_file_needs_a_confirmation(tmp_path):
     world = tmp_path / "w.sdf"
     world.write_bytes(ARENA.read_bytes())
     said = []
@@ -249,7 +249,7 @@ def test_a_changed_file_is_asked_about(tmp_path):
     assert world.read_text() == saved and "box_1" not in saved and "box_2" in saved
 
 
-def test_what_was_not_changed_is_saved_to_the_byte(tmp_path):
+def test_unchanged_parts_are_saved_to_the_byte(tmp_path):
     with editing(ARENA, "--save-as", "mine.sdf", folder=tmp_path) as process:
         reply = Client(process.port).ask("SAVE")
         assert (reply.code, reply.text) == (0, "")
@@ -288,7 +288,7 @@ def test_the_named_file_is_written_and_no_other(tmp_path):
         assert names == {"w.sdf", "w_2.sdf", "w_3.sdf"} and not (tmp_path / "nowhere").exists()
 
 
-def test_what_came_in_its_place_is_not_lost(tmp_path):
+def test_a_file_created_meanwhile_is_not_overwritten(tmp_path):
     """A new world's file is there by now, as whatever: what cannot be read is kept, too."""
     world = tmp_path / "new.sdf"
     with editing("new.sdf", folder=tmp_path) as process:
@@ -351,7 +351,7 @@ def said(*arguments, folder):
     return result.returncode, result.stderr
 
 
-def test_what_cannot_be_saved_is_said_first(tmp_path):
+def test_edit_refuses_first_if_it_cannot_save(tmp_path):
     (tmp_path / "world.sdf").write_text("<sdf/>")
     (tmp_path / "r.urdf").write_text("<robot name='r'><link name='l'/></robot>")
     for arguments, code, words in [

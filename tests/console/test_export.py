@@ -336,7 +336,7 @@ def test_logs_that_are_cut_off_or_strange(exported, tmp_path):
     assert list(messages(tmp_path / "odd.mcap")) == ["p3at/pose", "p3at/pose/values"]
 
 
-def test_what_cannot_be_done_is_said(exported, tmp_path):
+def test_an_impossible_request_is_reported(exported, tmp_path):
     log = exported / "run.lcm"
     (tmp_path / "no.lcm").write_bytes(b"hello")
     for arguments, code, words in (
@@ -442,7 +442,7 @@ def places_of(primitive):
     ]
 
 
-def test_what_clients_drew_is_in_foxgloves_file(drawn):
+def test_a_foxglove_file_has_the_drawings_of_clients(drawn):
     subprocess.run(
         [RUEDO, "export", drawn / "run.lcm", drawn / "run.mcap"], check=True, timeout=120
     )
@@ -477,7 +477,7 @@ def test_what_clients_drew_is_in_foxgloves_file(drawn):
             fits(json.loads(schema.data), json.loads(message.data))
 
 
-def test_what_clients_drew_is_in_a_bag(drawn):
+def test_a_bag_has_the_drawings_of_clients(drawn):
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 

@@ -71,7 +71,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict], dict]:
     return lines, exported
 
 
-def test_what_is_seen_is_what_export_writes(run: tuple[list[dict], dict]) -> None:
+def test_the_foxglove_server_equals_the_export(run: tuple[list[dict], dict]) -> None:
     lines, exported = run
     assert not [line for line in lines if "error" in line or "status" in line]
     messages = [line for line in lines if "topic" in line]
@@ -107,7 +107,7 @@ def test_channels_have_foxgloves_schemas(run: tuple[list[dict], dict]) -> None:
     assert info["supportedEncodings"] == ["json"]
 
 
-def test_who_comes_at_once_may_drive() -> None:
+def test_a_client_that_joins_at_once_may_drive() -> None:
     """Before the run's first messages have come this way; what was advertised is told by what is
     complained of first."""
     wish = {"id": 1, "topic": "/cmd_vel", "encoding": "json"}
@@ -208,7 +208,7 @@ HOSTILE = [
 ]
 
 
-def test_what_a_viewer_should_not_send_harms_nothing() -> None:
+def test_malformed_messages_of_a_viewer_are_harmless() -> None:
     with serving() as (process, url):
         for opcode, payload in HOSTILE:
             one, answer = open_socket(url)
@@ -258,7 +258,7 @@ def test_a_message_of_many_wishes_costs_little() -> None:
     ]
 
 
-def test_pictures_are_drawn_for_who_comes_after_a_change(tmp_path: Path) -> None:
+def test_pictures_are_drawn_for_a_viewer_after_a_change(tmp_path: Path) -> None:
     """Whether anybody wants them was asked only when models or clients of the bus came or went."""
     import ruedo
 
@@ -277,7 +277,7 @@ def test_only_foxgloves_own_pages_and_programs_come_in() -> None:
             assert b"101 " in open_socket(url, origin)[1], origin
 
 
-def test_who_comes_later_sees_what_clients_drew() -> None:
+def test_a_later_viewer_sees_the_drawings_of_clients() -> None:
     """The newest of each layer, once."""
     import ruedo
 

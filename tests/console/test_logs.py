@@ -203,7 +203,7 @@ def test_a_log_that_was_cut_off_is_shown_up_to_there(log, tmp_path):
         assert get(process.port, "/scene.json")[0] == 200
 
 
-def test_a_world_that_was_changed_or_is_gone_is_said(tmp_path):
+def test_a_changed_or_missing_world_is_reported(tmp_path):
     (tmp_path / "world.sdf").write_text((SOURCE / "tests/console/bumper.sdf").read_text())
     log = record(tmp_path / "run.lcm", tmp_path / "world.sdf")
     with open(tmp_path / "world.sdf", "a", encoding="utf-8") as world:
@@ -336,7 +336,7 @@ def test_strange_logs_do_not_hurt(log, tmp_path):
         ("folder", "is a folder; allowed is a log, or a ROS 2 bag"),
     ],
 )
-def test_what_is_no_log_is_said(tmp_path, content, words):
+def test_a_file_that_is_not_a_log_is_refused(tmp_path, content, words):
     path = tmp_path / "no.lcm"
     if content == "folder":
         path.mkdir()
@@ -348,7 +348,7 @@ def test_what_is_no_log_is_said(tmp_path, content, words):
     assert done.returncode == 3 and words in done.stderr and "no.lcm" in done.stderr
 
 
-def test_options_that_do_not_fit_are_said(log):
+def test_conflicting_options_are_refused(log):
     for arguments in (["--speed", "max"], ["--lcm", "memq://"]):
         done = subprocess.run(
             [RUEDO, "play", log, "--view", "0", *arguments],

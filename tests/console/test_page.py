@@ -74,7 +74,7 @@ def test_it_works_from_the_disk(log, tmp_path, size):
     )
 
 
-def test_what_does_not_fit_is_said(log, tmp_path):
+def test_a_page_that_does_not_fit_is_reported(log, tmp_path):
     done = page_of(log, tmp_path / "out.html", "--html-size", "1")
     if done.returncode == 0:
         assert (tmp_path / "out.html").stat().st_size <= 1e6

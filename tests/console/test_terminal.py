@@ -137,7 +137,7 @@ def test_echo_holds_no_more_than_it_may():
 
 
 @pytest.mark.parametrize("kind", ["tcpq", "unix"])
-def test_echo_goes_on_with_the_next_server(kind, tmp_path):
+def test_echo_continues_with_the_next_server(kind, tmp_path):
     url = ""
     for number in range(3):
         with listening(kind, tmp_path, url) as (server, url):
@@ -156,7 +156,7 @@ def test_echo_goes_on_with_the_next_server(kind, tmp_path):
     assert said.count("the server has closed the connection; it is looked for again") >= 2
 
 
-def test_echo_of_silence_ends_when_asked_to():
+def test_echo_of_a_silent_channel_ends_at_its_timeout():
     done = ruedo("echo", "nobody/home", "--timeout", "0.3")
     assert (
         done.returncode == 1
@@ -188,7 +188,7 @@ def test_hz_counts_what_comes():
     assert ruedo("hz", "silent", "-n", "1").returncode == 1
 
 
-def test_hz_counts_a_channel_that_is_named_twice_once():
+def test_hz_counts_a_repeated_channel_once():
     with published("beat", b"\0" * 1000, period_s=0.05):
         for witness in attempts():
             done = ruedo("hz", "beat", "beat", "-n", "2")
@@ -198,7 +198,7 @@ def test_hz_counts_a_channel_that_is_named_twice_once():
     assert len(done.stdout.splitlines()) == 2, done
 
 
-def test_play_says_what_nobody_took(tmp_path):
+def test_play_reports_messages_without_a_receiver(tmp_path):
     log = lcm.EventLog(str(tmp_path / "log"), "w")
     for time_us in (0, 1_000_000):
         log.write_event(time_us, "a", b"word")
@@ -354,7 +354,7 @@ def publish_info(*parts, channels=()):
         bus.publish("ruedo/info", info.encode())
 
 
-def test_teleop_drives_no_other_robot_of_the_name_before_a_key():
+def test_teleop_drives_a_new_robot_of_the_name_only_after_a_key():
     commands = Commands()
     with Teleop() as teleop:
         teleop.press(b"w")
@@ -428,7 +428,7 @@ def test_teleop_takes_no_byte_for_an_end_and_no_text_for_any_speed():
 
 
 @pytest.mark.parametrize("told", ["TERM", "HUP", "INT", "QUIT"])
-def test_teleop_leaves_a_robot_that_stands_and_the_terminal_as_it_was(told):
+def test_teleop_stops_the_robot_and_restores_the_terminal(told):
     commands = Commands()
     with Teleop() as teleop:
         teleop.press(b"w")
@@ -458,7 +458,7 @@ def test_teleop_is_suspended():
             termios.tcsetattr(teleop.child, termios.TCSANOW, teleop.before)  # as a shell does
 
 
-def test_teleop_is_suspended_by_its_key_and_goes_on_in_a_window_of_another_size():
+def test_teleop_resumes_in_a_window_of_another_size():
     script = 'set -m; "$0" "$@"; echo suspended; read; fg; echo "ended $?"'
     commands = Commands()
     with Teleop(script=script) as teleop:
@@ -480,7 +480,7 @@ def test_teleop_is_suspended_by_its_key_and_goes_on_in_a_window_of_another_size(
 
 
 @pytest.mark.parametrize("begin", ['"$0" "$@" &', '"$0" "$@";', '"$0" "$@"; bg;'])
-def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_when_it_is_reported(begin):
+def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_at_sigterm(begin):
     """As `kill %1` tells it: TERM and then CONT."""
     script = f"set -m; {begin} job=$(jobs -p); echo job $job.; read; wait $job; echo ended $?"
     with Teleop(script=script) as teleop:
@@ -498,7 +498,7 @@ def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_when_it_is_
         assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
 
 
-def test_teleop_ends_when_nobody_reads_what_it_says():
+def test_teleop_ends_when_its_output_is_closed():
     reads, writes = os.pipe()
     os.close(reads)
     with Teleop(stdout=writes) as teleop:
@@ -507,7 +507,7 @@ def test_teleop_ends_when_nobody_reads_what_it_says():
 
 
 @pytest.mark.parametrize("kind", ["tcpq", "unix"])
-def test_teleop_goes_on_with_the_next_server(kind, tmp_path):
+def test_teleop_continues_with_the_next_server(kind, tmp_path):
     from ruedo.lcmtypes import velocity_command_t
 
     with listening(kind, tmp_path) as (server, url):

@@ -117,7 +117,7 @@ def test_links_of_the_site_lead_somewhere(site):
                 assert (page.parent / path).exists(), f"{page.relative_to(site)}: {link}"
 
 
-def test_what_a_page_needs_is_small(site):
+def test_pages_load_few_bytes(site):
     files = [path for path in site.rglob("*") if path.is_file()]
     assert not [path for path in files if path.suffix == ".map"]
     # Most of it pictures; what is left is compressed to a quarter in the wheel.

@@ -76,7 +76,7 @@ def test_arrays_show_the_runs_without_a_copy():
     assert math.isinf(ranges[2, 1, 4])  # what was observed stays readable
 
 
-def test_what_has_not_come_since_a_reset_is_not_the_run_befores():
+def test_a_reset_clears_the_samples_of_the_earlier_run():
     with engine(robots=2, worlds=2, fault=["r0/scan:dropout@0,for=1"]) as e:
         with pytest.raises(ValueError, match=r"scan\.ranges has no sample yet"):
             e.observe("scan.ranges")
@@ -143,7 +143,7 @@ def test_seeds_make_the_noise():
         assert several.state_hash(2) == third.state_hash()
 
 
-def test_reset_begins_anew():
+def test_a_reset_equals_a_fresh_run():
     with engine(worlds=4, seed=1) as e:
         ranges, beginning = e["scan.ranges"], e["scan.ranges"].copy()
         e.step([0.3, 0.1], 50)
@@ -297,7 +297,7 @@ class Wrong:
         (lambda e: (e.close(), e.end_run()), RuntimeError, "closed"),
     ],
 )
-def test_errors_say_what_is_wrong(call, error, text):
+def test_errors_have_their_reason(call, error, text):
     with engine(worlds=2) as e, pytest.raises(error) as caught:
         call(e)
     assert text in str(caught.value)
@@ -317,7 +317,7 @@ def test_a_daemon_thread_may_be_at_work_when_the_program_ends():
         assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_more_threads_than_cores_are_nothing_to_talk_about():
+def test_more_threads_than_cores_give_no_warning():
     """Regression: TBB wrote a warning to the program's standard error."""
     program = f"import ruedo\nruedo.Engine('w.sdf', text={world()!r}, threads=4096).step(n=9)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
@@ -385,7 +385,7 @@ def test_a_long_step_counts_touches_as_short_ones_do():
 
 
 @pytest.mark.parametrize("lag", [1, 7, 20, 33])
-def test_what_lags_is_so_late_however_many_steps_a_call_takes(lag):
+def test_a_lag_does_not_depend_on_the_steps_of_a_call(lag):
     """Regression: what a faulty lidar had kept came with the next sample that was due in the same
     call, or in a later one; in a server that depended on real time.
     """
@@ -597,7 +597,7 @@ def with_camera(**options):
     )
 
 
-def test_a_picture_that_is_read_late_is_the_one_that_was_due():
+def test_a_picture_read_late_is_the_due_one():
     """Noise too: it follows the number of the sample. 0.32 s are 64 steps: the newest picture is
     that of 0.3 s, which no later one of the same call replaces."""
     with with_camera(worlds=2) as early, with_camera(worlds=2) as late:

@@ -78,7 +78,7 @@ def same(one, other):
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("task", TASKS)
-def test_what_follows_a_saved_episode_is_what_followed(task, mode):
+def test_a_restored_episode_continues_equally(task, mode):
     """Through the ends of episodes, in their own environments and in others."""
     envs = gymnasium.make_vec(
         f"ruedo/{task}-v0", num_envs=3, autoreset_mode=AutoresetMode(mode)
@@ -315,7 +315,7 @@ def test_rooms_are_the_same_everywhere_and_their_start_is_free():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_rooms_for_tests_are_none_of_those_for_training(task):
+def test_test_rooms_are_disjoint_from_training_rooms(task):
     for split, numbers in (
         ("train", range(TEST_ROOMS)),
         ("test", range(TEST_ROOMS, 2 * TEST_ROOMS)),
@@ -592,7 +592,7 @@ def fleet_followed(env, actions):
 
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array"])
-def test_what_follows_a_saved_fleet_is_what_followed(render_mode):
+def test_a_restored_fleet_continues_equally(render_mode):
     env = ruedo.gym.FleetEnv(4, beams=6, render_mode=render_mode)
     env.most_actions = 120
     env.reset(seed=3)
@@ -736,7 +736,7 @@ sys.exit(7)
 
 
 @pytest.mark.parametrize("renderer", ["osmesa", "egl"])
-def test_a_fork_of_who_has_drawn_draws_nothing(renderer):
+def test_a_fork_after_drawing_cannot_draw(renderer):
     """It says so, closes what it has of the other's, and ends as any process does."""
     done = subprocess.run(
         [sys.executable, "-c", FORKED],

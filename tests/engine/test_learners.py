@@ -121,7 +121,7 @@ def test_drawn_values_are_in_reset_infos(sb3):
     env.close()
 
 
-def test_without_the_library_its_name_is_said(monkeypatch):
+def test_a_missing_library_is_reported_by_name(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     monkeypatch.delitem(sys.modules, "ruedo.gym.sb3", raising=False)
     with pytest.raises(ImportError, match="pip install stable-baselines3"):

@@ -138,7 +138,7 @@ def test_wrong_descriptions_are_refused(draws, text):
     assert text in str(caught.value)
 
 
-def test_texts_that_come_again_are_read_once_and_differ():
+def test_repeated_texts_are_read_once_and_differ():
     from ruedo.rooms import make_room
 
     rooms = [make_room(i) for i in range(3)]

@@ -42,14 +42,14 @@ def check(options, seed, episodes=3):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 7, 9, 12, 14])
-def test_random_worlds_begin_anew(seed):
+def test_random_worlds_reset_to_a_fresh_run(seed):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
     options = {"world": "w.sdf", "text": world.text, "spawn": world.spawn, "fault": world.fault}
     check({**options, "allow_errors": True}, seed)  # robots may stand in something
 
 
 @pytest.mark.parametrize("world", ["crossing", "terrain", "warehouse", "fleet", "office"])
-def test_our_worlds_begin_anew(world):
+def test_our_worlds_reset_to_a_fresh_run(world):
     with ruedo.Engine(world) as engine:
         cameras = [f"{robot}/{name}" for robot, name, kind in engine.devices if kind == "camera"]
     check({"world": world, "disable": cameras}, 5, episodes=2)
@@ -63,7 +63,7 @@ def fleet_room(number):
     "make",
     [make_room, make_corridor, make_crowd_hall, make_push_room, make_landmark_room, fleet_room],
 )
-def test_scenes_of_the_tasks_begin_anew(make):
+def test_scenes_of_the_tasks_reset_to_a_fresh_run(make):
     """Each time another scene, with what is drawn of it; the room of the red pillar with its
     camera.
     """

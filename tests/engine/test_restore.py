@@ -88,7 +88,7 @@ class Server:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 7, 9, 12])
-def test_random_worlds_go_on_as_they_went_on(seed, tmp_path):
+def test_random_worlds_continue_equally_after_a_restore(seed, tmp_path):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
     (tmp_path / "w.sdf").write_text(world.text)
     with ruedo.Engine(

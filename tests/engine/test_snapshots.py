@@ -45,7 +45,7 @@ def check(engine, seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 7, 9, 12, 14, 17])
-def test_random_worlds_go_on_as_they_went_on(seed):
+def test_random_worlds_continue_equally_after_a_restore(seed):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
     with ruedo.Engine(
         "w.sdf",
@@ -61,7 +61,7 @@ def test_random_worlds_go_on_as_they_went_on(seed):
 
 
 @pytest.mark.parametrize("world", ["crossing", "terrain", "warehouse", "fleet"])
-def test_our_worlds_go_on_as_they_went_on(world):
+def test_our_worlds_continue_equally_after_a_restore(world):
     with ruedo.Engine(
         world,
         worlds=3,
@@ -148,7 +148,7 @@ def test_threads_and_cores_change_nothing():
         assert hashes(engine, 0) == after
 
 
-def test_a_picture_that_nobody_read_when_it_was_saved_is_the_one_that_was_due():
+def test_an_unread_picture_after_a_restore_is_the_due_one():
     def driven():
         engine = ruedo.Engine("arena", seed=2, settings={"p3at/camera.ruedo:encoding": "rgb"})
         engine.step(np.full((1, 1, 2), [0.3, 0.5]), 150)
@@ -165,7 +165,7 @@ def test_a_picture_that_nobody_read_when_it_was_saved_is_the_one_that_was_due():
         assert (seen[0] == expected).all()
 
 
-def test_errors_say_what_is_wrong():
+def test_errors_have_their_reason():
     with arena() as engine, arena() as other:
         saved = engine.save()
         assert repr(saved) == "<ruedo.SavedWorld: world 0 at 0 s>"

@@ -305,7 +305,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_a_mistake_in_a_task_is_named(what):
+def test_an_error_in_a_task_is_reported(what):
     attributes, error, text = WRONG[what]
     with pytest.raises(error, match=text):
         envs = ruedo.gym.TaskVectorEnv(type("Wrong", (Approach,), attributes), 2)

@@ -74,7 +74,7 @@ def test_delay_limits_and_lag_are_found():
     assert np.mean(inside) > 0.85, f"{np.mean(inside):.0%} of 95 % intervals hold the true value"
 
 
-def test_what_commands_do_not_reach_is_not_invented():
+def test_limits_beyond_the_commands_are_not_estimated():
     found = by_name(recorded(3, 0.05, 1e3, 1e3, 0.2))
     assert found["speed: acceleration"].value is None
     assert found["speed: lag"].value == pytest.approx(0.2, rel=0.05)

@@ -164,7 +164,7 @@ def test_damaged_gzip(tmp_path):
         read(log)
 
 
-def test_command_says_what_is_wrong(tmp_path):
+def test_errors_of_the_command(tmp_path):
     (tmp_path / "a.log").write_text("hello\n")
     _, said = ruedo("fit", tmp_path / "a.log", code=3)
     assert said.startswith(f"ruedo: {tmp_path}/a.log: it begins with 'hello'")

@@ -62,7 +62,7 @@ def test_imu_with_random_walk():
     assert found["turn rate y: noise"].value == pytest.approx(0.005, rel=0.05)
 
 
-def test_imu_of_a_robot_that_never_stands():
+def test_imu_of_a_robot_that_never_rests():
     time = np.arange(600) / 10
     pose = np.stack([time, 0 * time, 0 * time], axis=1)
     recording = Recording(

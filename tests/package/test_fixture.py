@@ -62,7 +62,7 @@ def test_the_package_is_there_once(python, package):
     assert said == f"[('ruedo', '{version}')]\nruedo.regression\n"
 
 
-def test_the_summary_says_what_failed(python, package, tmp_path):
+def test_the_summary_lists_the_failures(python, package, tmp_path):
     """Not the first warning of the run."""
     (tmp_path / "w.sdf").write_text(
         "<sdf version='1.9'><world name='w'><nonsense/>"

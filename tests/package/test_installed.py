@@ -82,7 +82,7 @@ def test_the_moved_program_finds_its_own(prefix):
         assert str(SOURCE / "worlds") not in said
 
 
-def test_what_takes_long_to_load_is_loaded_late(prefix):
+def test_slow_libraries_are_loaded_on_demand(prefix):
     """`ruedo --version` and all that draws nothing start without the renderer's compiler and
     OpenCV's codecs: measured, 16 ms of CPU instead of 126. Who draws finds them.
     """
@@ -149,7 +149,7 @@ def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
 
 
 @pytest.mark.parametrize("language", ["python", "cpp", "java"])
-def test_a_program_of_the_clients_words(language, prefix, tmp_path):
+def test_a_program_that_uses_the_clients_api(language, prefix, tmp_path):
     """Launch options, streams joined by stamp, driving, bodies, joints and maps."""
     here = Path(__file__).parent / "api"
     more = {}
@@ -174,7 +174,7 @@ def test_a_program_of_the_clients_words(language, prefix, tmp_path):
     assert said == ["rate 20", "drove True", "joint position", "ray 0.95"]
 
 
-def test_what_a_project_installs_starts(prefix, tmp_path):
+def test_an_installed_project_starts(prefix, tmp_path):
     """Each of the libraries; from and to folders with blanks in their names."""
     ours = tmp_path / "with a blank/ruedo"
     shutil.copytree(prefix, ours, symlinks=True)
@@ -267,12 +267,12 @@ def test_another_way_is_the_first_difference(prefix, tmp_path):
         ),
     ],
 )
-def test_what_does_not_hold_is_said(prefix, options, code, words, tmp_path):
+def test_a_failed_expectation_is_reported(prefix, options, code, words, tmp_path):
     said = regress(prefix, *options, folder=tmp_path, code=code)
     assert re.search(words, said), said
 
 
-def test_contact_is_said(prefix, tmp_path):
+def test_a_contact_is_reported(prefix, tmp_path):
     """Straight ahead into a wall."""
     world = SOURCE / "tests/clients/hall.sdf"
     client = 'import ruedo\nsim = ruedo.connect(timeout=30)\nsim.step(2300, [sim.robot("p3at").move_command("advance", 7.0)])\n'

@@ -48,7 +48,7 @@ def sbom(wheels, tmp_path_factory):
     return json.loads(out.read_text())
 
 
-def test_what_is_compiled_in_is_listed_and_nothing_else(read):
+def test_exactly_the_compiled_parts_are_listed(read):
     sources, packages = read
     assert sources == set(parts.COMPILED)
     assert packages == set(parts.COMPILED_PYPI)
@@ -96,7 +96,7 @@ def test_nothing_is_of_the_host_or_under_the_gpl(wheels):
     assert not [name for name in sizes if re.match("lib(atlas|openblas|gfortran|mkl)", name)]
 
 
-def test_the_sbom_says_the_licence_of_each_part(sbom):
+def test_the_sbom_has_the_licence_of_each_part(sbom):
     names = {package["name"] for package in sbom["packages"]}
     assert {"nlohmann-json3 (source)", "libllvm15", "three", "lcm", "nanobind"} <= names
     for package in sbom["packages"]:

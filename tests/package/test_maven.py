@@ -60,7 +60,7 @@ def test_the_artifact_is_whole(artifact):
     assert pom.findtext("m:developers/m:developer/m:name", namespaces=space) == "A. Nyone"
 
 
-def test_the_compiler_has_nothing_to_say(artifact, tmp_path):
+def test_it_compiles_without_warnings(artifact, tmp_path):
     """Of the library, its examples and the programs of its tests."""
     import lcm
 

@@ -235,7 +235,7 @@ def test_echo_reads_lcm_files(prefix, project, ruedo):
         ("struct a_t { a_t x; }", "the type 'a_t': it holds itself"),
     ],
 )
-def test_wrong_types_are_named(ruedo, tmp_path, text, words):
+def test_malformed_types_are_reported(ruedo, tmp_path, text, words):
     (tmp_path / "a.lcm").write_text(text)
     said = ruedo("echo", "rover/temp", "--types", tmp_path, code=3)
     assert said.count("\n") == 1 and words in said
@@ -401,7 +401,7 @@ def at_work_run(ruedo, at_work, mode, *options, code):
         ("name", 4, "'a b' is not a name of a channel or a type: printable ASCII"),
     ],
 )
-def test_what_a_plugin_does_wrong_at_work_is_one_line(ruedo, at_work, mode, code, words):
+def test_a_plugins_fault_is_reported_in_one_line(ruedo, at_work, mode, code, words):
     said = at_work_run(ruedo, at_work, mode, code=code)
     assert said.count("\n") == 1 and f"the plugin libbad.so, rover/temp: {words}" in said, said
 

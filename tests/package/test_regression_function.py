@@ -201,7 +201,7 @@ WORDS = [
 ]
 
 
-def test_words_arrive_as_they_were_written(prefix, tmp_path):
+def test_arguments_arrive_unchanged(prefix, tmp_path):
     """Regression: what followed `;` was dropped, of the program's words and of its shell's."""
     (tmp_path / "show.py").write_text("import json, sys\nprint(json.dumps(sys.argv[1:]))\n")
     program = [sys.executable, str(tmp_path / "show.py")]
@@ -225,7 +225,7 @@ def test_words_arrive_as_they_were_written(prefix, tmp_path):
 
 
 @pytest.mark.parametrize("minimum", ["3.0", "3.22"])
-def test_words_arrive_in_a_run(prefix, tmp_path, minimum):
+def test_arguments_arrive_unchanged_in_a_run(prefix, tmp_path, minimum):
     """As ctest starts it; with all policies of old, too."""
     (tmp_path / "same.py").write_text(
         "import json, sys\nsys.exit(json.load(open(sys.argv[1])) != sys.argv[2:])\n"
@@ -263,7 +263,7 @@ def test_words_arrive_in_a_run(prefix, tmp_path, minimum):
         ("$<TARGET_FILE:robot> -v", "'{folder}/build/robot' -v"),
     ],
 )
-def test_one_word_with_a_shells_signs_is_a_line_for_it(prefix, tmp_path, client, line):
+def test_one_argument_with_shell_characters_is_a_command_line(prefix, tmp_path, client, line):
     (tmp_path / "my client").write_text("")
     (tmp_path / "robot.c").write_text("int main() { return 0; }")
     robot = "add_executable(robot robot.c)\n" if "robot" in client else ""
@@ -320,7 +320,7 @@ def test_components(prefix, tmp_path, project, components, missing):
     assert not missing or "considered to be NOT FOUND" in said
 
 
-def test_another_project_goes_on_without_what_is_not_found(prefix, tmp_path):
+def test_a_project_configures_without_optional_components(prefix, tmp_path):
     said = configure(
         prefix,
         tmp_path,

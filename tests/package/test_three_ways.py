@@ -99,7 +99,7 @@ def test_fetch_content(tmp_path, archive):
     assert "/nowhere" in error
 
 
-def test_a_machine_without_lcm_is_reported_what_to_do(tmp_path, archive):
+def test_without_lcm_the_error_says_how_to_install_it(tmp_path, archive):
     run("tar", "xzf", archive, "-C", tmp_path)
     said = run(
         CMAKE,
@@ -148,7 +148,7 @@ def test_nothing_is_forced_and_nothing_depends_on_the_top():
 
 
 @pytest.mark.parametrize("folder", ["web", "scripts/lint_tools"])
-def test_the_npm_of_debian_reads_what_is_asked_of_it(folder):
+def test_debians_npm_reads_the_lock_file(folder):
     """npm 9.2, of Debian 12 and 13, takes no lock file beside an alias in "overrides"; its `npm ci`
     then says that there is none. Newer ones do not mind.
     """

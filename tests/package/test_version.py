@@ -51,7 +51,7 @@ def test_the_changes_begin_with_it():
     assert re.search(r"^## (\S+?),? ", text, re.MULTILINE).group(1) == VERSION
 
 
-def test_it_stands_nowhere_else():
+def test_the_version_is_written_nowhere_else():
     """Where files name this project's version; the versions of logs and of other projects do not
     matter here.
     """

@@ -86,7 +86,7 @@ with ruedo.connect(sys.argv[1], timeout=30) as sim:
     assert "at 0.30" in said and "it comes with Ruedo's wheel" in said
 
 
-def test_without_the_renderer_the_error_names_it(tmp_path):
+def test_a_missing_renderer_is_reported(tmp_path):
     venv = make_venv(tmp_path / "venv", WHEELS["ruedo"], WHEELS["ruedo_client"])
     render = f"RUEDO_RENDERER=osmesa {venv}/bin/ruedo render arena -o {tmp_path}/a.png 2>&1"
     said = run("sh", "-c", f"{render}; test $? = 4")
@@ -158,12 +158,12 @@ with ruedo.Engine("arena", disable=["p3at/camera"]) as engine:
     assert said[0].startswith(str(venv)) and said[1] == "(1, 1, 181)"
 
 
-def test_a_program_of_the_clients_words(venv, tmp_path):
+def test_a_program_that_uses_the_clients_api(venv, tmp_path):
     said = run(venv / "bin/python", Path(__file__).parent / "api/api.py", tmp_path)
     assert said.endswith("rate 20\ndrove True\njoint position\nray 0.95\n")
 
 
-def test_an_unknown_world_is_reported_with_those_that_there_are(venv):
+def test_an_unknown_world_is_reported_with_the_existing_ones(venv):
     said = run(
         venv / "bin/python",
         "-c",

@@ -98,7 +98,7 @@ def machine():
 as_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root to be root and to become nobody")
 
 
-def test_nothing_is_asked_where_all_is_there(machine):
+def test_installed_packages_are_not_requested(machine):
     assert machine(installed=["a", "new_b", "c"]).ensure("a", "old_b|new_b", "?c") == (0, "", [])
 
 
@@ -125,7 +125,7 @@ def test_fresh_machine_learns_names_from_the_update(machine):
     assert calls[-1].endswith("-q old_b kept")
 
 
-def test_optional_package_that_nobody_has_is_no_reason_to_ask(machine):
+def test_an_unknown_optional_package_is_not_requested(machine):
     assert machine(installed=["a"], known=["a"]).ensure("a", "?gone") == (0, "", [])
 
 

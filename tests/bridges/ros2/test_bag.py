@@ -129,7 +129,7 @@ def test_rosbags_reads_the_log_message_by_message(logged):
         assert bytes(image.data) == ours.data
 
 
-def test_ranges_are_those_that_were_measured_anew(logged):
+def test_ranges_hold_only_fresh_measurements(logged):
     bag, log = (
         bag_messages(logged / "run", store_of("jazzy")),
         log_messages(logged / "run.lcm"),
@@ -489,7 +489,7 @@ def test_names_take_no_more_memory_than_names_need(tmp_path):
     assert f"has more than {64 << 20} bytes of schemas and channels at byte {at}" in line
 
 
-def test_what_lies_beside_the_topics_is_read_and_written_by_others(logged, tmp_path):
+def test_other_libraries_read_and_write_attachments(logged, tmp_path):
     """By the library mcap; a name that leads out of the folder is not followed."""
     with (logged / "run/run_0.mcap").open("rb") as file:
         found = {one.name: one.data for one in make_reader(file).iter_attachments()}

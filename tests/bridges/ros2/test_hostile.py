@@ -70,7 +70,7 @@ def drives(peer, cmd_vel, odometry):
     ],
     ids=["bytes", "short"],
 )
-def test_bytes_that_are_no_message_are_counted(kind, samples):
+def test_malformed_messages_are_counted(kind, samples):
     with Run("--no-noise") as run:
         peer = Peer(run.domain)
         liar = peer.writer("/cmd_vel", kind)

@@ -99,7 +99,7 @@ def test_markers_appear_and_are_removed(run):
 
 
 @pytest.mark.parametrize("latched", [False, True])
-def test_who_comes_later_gets_the_newest_of_each_layer(run, latched):
+def test_a_later_viewer_gets_the_newest_message_of_each_layer(run, latched):
     first = Viewer(run)
     with ruedo.connect(LCM, timeout=60) as sim:
 

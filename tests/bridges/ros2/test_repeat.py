@@ -88,7 +88,7 @@ def test_a_run_without_ros2_has_the_same_bytes(tmp_path):
         (["--wait-for", "/scan@10"], "'/scan' that takes commands"),
     ],
 )
-def test_a_topic_that_takes_no_commands_is_named(arguments, words):
+def test_a_topic_without_commands_is_refused(arguments, words):
     with Run(*arguments) as run:
         assert words in run.process.communicate(timeout=60)[0]
         assert run.process.returncode == 2

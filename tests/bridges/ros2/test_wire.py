@@ -58,7 +58,7 @@ def test_scan_is_of_the_wall_ahead(standing):
     assert all(r > 0.02 for r in scan.ranges)
 
 
-def test_qos_that_does_not_match_is_named():
+def test_incompatible_qos_is_reported():
     with Run("--disable", "p3at/camera") as run:
         peer = Peer(run.domain)
         peer.reader("/scan", LaserScan, latched=True)
@@ -258,7 +258,7 @@ def test_topics_are_remapped():
         (["--ros2-clock", "0"], {}, "--ros2-clock"),
     ],
 )
-def test_wrong_usage_is_named(arguments, environment, words):
+def test_wrong_usage_is_reported(arguments, environment, words):
     with Run(*arguments, environment=environment) as run:
         output = run.process.communicate(timeout=60)[0]
         assert words in output

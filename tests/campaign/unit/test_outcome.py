@@ -62,7 +62,7 @@ def test_a_memory_error_in_the_output_hides_no_failed_expectation():
 @pytest.mark.parametrize(
     "word", ["MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory"]
 )
-def test_a_client_without_memory_is_no_crash(word):
+def test_a_client_out_of_memory_does_not_count_as_crashed(word):
     told = "the controller wanted more than 100 MB of memory"
     assert taken(failure("client"), output=f"x {word} y") == ("memory", "controller", told)
     assert taken(failure("run"), output=word)[0] == "crashed"
@@ -100,7 +100,7 @@ def test_it_begins_as_passed_and_empty():
     }
 
 
-def test_words():
+def test_texts_of_outcomes():
     assert in_a_line(" a\n b\t c ") == "a b c"
     assert in_a_line("x" * 501) == "x" * 500
     assert of_controller("the client of the client") == "the controller of the controller"

@@ -63,7 +63,7 @@ def wrong():
 
 
 @pytest.mark.launch(fixture=wrong)
-def test_what_was_not_run_is_said(wrong):
+def test_an_unrun_regression_is_reported(wrong):
     _, run = wrong
     with pytest.raises(RuntimeError, match="ended with 3"):
         run.verdict(60)

@@ -51,7 +51,7 @@ def steps(peer):
     steps.client.destroy()
 
 
-def test_a_goal_takes_its_steps_and_tells_of_each(steps):
+def test_a_goal_takes_its_steps_with_feedback_for_each(steps):
     # rclpy's client drops the feedback of a goal that has ended meanwhile.
     heard = steps.peer.hear(SimulateSteps.Impl.FeedbackMessage, f"{NAME}/_action/feedback")
     before = steps.sim_us()

@@ -251,7 +251,7 @@ def test_queries_of_entities(client):
     )
 
 
-def test_what_is_known_of_an_entity(client):
+def test_entity_info_and_state(client):
     about, say, ask = "get_entity_info", "set_entity_info", "get_entities"
     check(
         client,
@@ -559,7 +559,7 @@ def test_robots_come_and_go_with_their_topics(run, peers):
     assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
 
 
-def test_where_somebody_says_the_robot_is_there_it_is_put(run, peers):
+def test_initialpose_moves_the_robot(run, peers):
     peer = peers(run)
     truth = peer.hear(Odometry, "/ground_truth")
     initial = peer.node.create_publisher(PoseWithCovarianceStamped, "/initialpose", 10)

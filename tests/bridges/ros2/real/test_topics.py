@@ -132,7 +132,7 @@ def test_readers_of_each_quality_are_served(peer):
     peer.spin_until(lambda: all(len(messages) >= 10 for messages in heard), "scans of each")
 
 
-def test_those_who_come_late_get_what_stays(run, peers):
+def test_late_subscribers_get_latched_messages(run, peers):
     early = peers(run, "early")
     clocks = early.hear(Clock, "/clock")
     early.spin_until(lambda: clocks and seconds(clocks[-1].clock) > 1.0, "a second")
@@ -334,7 +334,7 @@ def test_two_robots_have_a_namespace_each(peers):
         assert all("/" in child for child in children(all_trees))
 
 
-def test_diagnostics_tell_how_the_run_gets_on(peer):
+def test_diagnostics_report_the_runs_rate(peer):
     messages = peer.hear(DiagnosticArray, "/diagnostics")
     peer.spin_until(lambda: len(messages) >= 2, "diagnostics")
     apart = seconds(messages[1].header.stamp) - seconds(messages[0].header.stamp)
