@@ -197,7 +197,7 @@ def test_a_log_is_plotted_whole(tmp_path):
         seen = browse(process.url, tmp_path, "fields_log", given)
     assert {
         "it is the log's, from its first message to its last",
-        "and its statistics are told",
+        "and its statistics are shown",
         "a click in a plot seeks",
         "standard plots show what was before",
         "and the path, as y over x",
@@ -296,9 +296,9 @@ def test_events_of_a_run_are_reported(crash, tmp_path):
     with running(world=crash) as process:
         seen = browse(process.url, tmp_path, "events")
     assert {
-        "a command is told",
-        "a collision is told",
-        "the past is jumped into",
+        "a command is reported",
+        "a collision is reported",
+        "a click jumps to the past",
         "End comes back",
         "after a reset earlier events hold no more",
     } <= set(seen)
@@ -330,7 +330,7 @@ def test_samples_in_space_are_shown(tmp_path):
         "names stand over what they name",
         "a camera's picture is in the view",
         "whatever the panel shows",
-        "joints are told",
+        "joints are shown",
         "a slider ends where its joint does",
         "a slider moves a joint",
         "an IMU at rest shows gravity, and no turning",
@@ -664,7 +664,7 @@ def test_everything_is_steered(steered):
         "a gamepad drives ahead",
         "a gamepad turns left",
         "a motion primitive is done",
-        "it went as far as was asked",
+        "it went the requested distance",
         "both trails lead to where the robot is",
         "contact points are where the pad touches the ground",
         *(f"{layer} can be switched" for layer in LAYERS),
@@ -676,7 +676,7 @@ def test_everything_is_steered(steered):
         "a robot was placed",
         "where there is no room, it says so",
         "the server has the rate that was chosen",
-        "at a quarter of the rate the clock goes a quarter as fast",
+        "at a quarter of the rate the clock runs a quarter as fast",
         "a reset sets the clock back",
         "a reset takes away what was placed",
         "a reset puts the robot back",

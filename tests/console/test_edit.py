@@ -220,7 +220,7 @@ def test_a_late_client_of_a_paused_run_gets_its_state(tmp_path):
     import ruedo
 
     with running("--paused", "--disable", "p3at/camera") as process:
-        time.sleep(1)  # its first state is told
+        time.sleep(1)  # its first state is published
         comes_to_know(process, 0)
         time.sleep(1)
         with ruedo.connect(timeout=60) as sim:

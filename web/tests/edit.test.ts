@@ -27,7 +27,7 @@ describe("history", () => {
     return { said, states, history, step };
   }
 
-  it("takes back and does again, in order, one at a time", async () => {
+  it("undoes and redoes, in order, one at a time", async () => {
     const { said, states, history, step } = recorded();
     void history.do(step("a"));
     void history.do(step("b"));
@@ -40,7 +40,7 @@ describe("history", () => {
     expect(states.at(-1)).toEqual({ undo: "c", redo: null, changes: 6 });
   });
 
-  it("has no step that did not come to pass", async () => {
+  it("has no step that did not happen", async () => {
     const { states, history, step } = recorded();
     expect(await history.do(step("a", false))).toBe(false);
     expect(states.at(-1)).toEqual({ undo: null, redo: null, changes: 0 });
@@ -59,7 +59,7 @@ describe("poses", () => {
     ]);
   });
 
-  it("are those that were told, and none is made up", () => {
+  it("are the received ones, without invented ones", () => {
     const poses = new Poses(),
       model = { name: "box", body: 1, pose: [0, 0, 0.5, 1, 0, 0, 0] } as ModelDescription;
     expect(poseNow(model, poses)).toBeNull();

@@ -34,7 +34,7 @@ describe("a formula", () => {
     expect(() => formulaOf("c", text)).toThrow(new RegExp(words));
   });
 
-  it("takes the last value of what comes more seldom", () => {
+  it("uses the last value of a slower channel", () => {
     const often = { times: [0, 1, 2, 3], values: [1, 2, 3, 4] },
       seldom = { times: [0.5, 2], values: [10, 20] };
     expect(formulaOver(formulaOf("c", "x + {d y}"), [often, seldom])).toEqual({
@@ -63,7 +63,7 @@ describe("fields of arrays", () => {
     expect(fieldsOf("planar_lidar_t", message)).not.toContain("ranges[40]");
   });
 
-  it("tell of all of them at once, of those that are finite", () => {
+  it("summarise all of them, without those that are not finite", () => {
     const message = {
       ranges: new Float32Array([3, Infinity, 1, NaN, 2]),
       points: [{ d: 1 }, { d: 5 }],

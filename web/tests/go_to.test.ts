@@ -74,7 +74,7 @@ describe("a robot that is sent to a point", () => {
     expect(stuck.goTo.points()).toEqual([]);
   });
 
-  it("says why it stops, but for what the user himself told it instead", () => {
+  it("shows why it stops, except for the user's own command", () => {
     const { goTo, status, failures } = robot();
     goTo.go({ x: 1, y: 0 }, false);
     status(motion_status_t.STATE_ENDED, motion_status_t.REASON_BLOCKED, 99n); // another's

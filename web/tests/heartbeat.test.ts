@@ -15,7 +15,7 @@ function server() {
   return { is, heart };
 }
 
-it("a server that says something is not asked", async () => {
+it("a server that sends messages gets no ping", async () => {
   const { is, heart } = server();
   for (let at_ms = 0; at_ms < 60_000; at_ms += 1000) {
     heart.heard(at_ms);
@@ -24,14 +24,14 @@ it("a server that says something is not asked", async () => {
   expect([is.asked, is.told]).toEqual([0, []]);
 });
 
-it("one that has nothing to say is asked every three seconds, and nobody hears of it", async () => {
+it("an idle one gets a ping every three seconds, without a note", async () => {
   const { is, heart } = server();
   heart.restart(0);
   for (let at_ms = 0; at_ms <= 30_000; at_ms += 1000) await heart.look(at_ms);
   expect([is.asked, is.told]).toEqual([10, []]);
 });
 
-it("one that does not answer is told once, and once more when it is heard again", async () => {
+it("one that does not answer is reported once, and again when it answers", async () => {
   const { is, heart } = server();
   is.there = false;
   for (let at_ms = 0; at_ms <= 30_000; at_ms += 1000) await heart.look(at_ms);
@@ -41,7 +41,7 @@ it("one that does not answer is told once, and once more when it is heard again"
   expect(is.told).toEqual([true, false]);
 });
 
-it("what comes while it is asked is an answer, too; another connection begins anew", async () => {
+it("any message counts as an answer; another connection restarts it", async () => {
   const { is, heart } = server();
   is.there = false;
   const looked = heart.look(10_000);

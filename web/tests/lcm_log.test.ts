@@ -24,7 +24,7 @@ async function eventsOf(log: LcmLog) {
 }
 
 describe("a log that the page makes", () => {
-  it("begins with the header, and goes on where sim time is reset", async () => {
+  it("begins with the header, and continues at a reset of sim time", async () => {
     const log = new LcmLog(Uint8Array.of(9));
     log.add("a", 2_000_000, Uint8Array.of(1, 2));
     log.add("b/c", 1_900_000, Uint8Array.of(3));

@@ -74,7 +74,7 @@ describe("the order of loading", () => {
     }
   });
 
-  it("takes no world before it was greeted", () => {
+  it("accepts no world before the greeting", () => {
     const { loading, told } = page();
     loading.onInfo(info(["a"]));
     expect(told).toEqual([]);
@@ -87,7 +87,7 @@ describe("the order of loading", () => {
     expect(last()).toBe("runs a");
   });
 
-  it("shows the scene that was asked for last, though an older one comes after it", async () => {
+  it("shows the scene that was requested last, though an older one arrives after it", async () => {
     const { loading, waiting, server, settle, last, told } = page();
     loading.onHello(kHello);
     loading.onInfo(info(["a"]));
@@ -101,7 +101,7 @@ describe("the order of loading", () => {
     expect(told.filter((line) => line.includes(" in "))).toHaveLength(1);
   });
 
-  it("is told again when a robot has come, and not when nothing has changed", async () => {
+  it("is sent again when a robot was added, and not without a change", async () => {
     const { loading, waiting, settle, told } = page();
     loading.onHello(kHello);
     loading.onInfo(info(["a"]));
@@ -112,7 +112,7 @@ describe("the order of loading", () => {
     expect(told.filter((line) => line.includes(" in "))).toEqual(["a in scene", "a,b in scene"]);
   });
 
-  it("tries once more, and goes on without a scene", async () => {
+  it("tries once more, and continues without a scene", async () => {
     const { loading, waiting, settle, told } = page();
     loading.onHello(kHello);
     loading.onInfo(info(["a"]));
@@ -124,7 +124,7 @@ describe("the order of loading", () => {
     expect(told.slice(-2)).toEqual(["failed: no", "a in null"]);
   });
 
-  it("begins anew with another connection", async () => {
+  it("restarts with another connection", async () => {
     const { loading, waiting, settle, last } = page();
     loading.onHello(kHello);
     loading.onInfo(info(["a"]));

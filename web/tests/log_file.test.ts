@@ -14,7 +14,7 @@ describe("a log in the page", () => {
     expect(newestAt([], 1)).toBe(-1);
   });
 
-  it("tells a field over time, without what is no message", () => {
+  it("gives a field over time, without malformed messages", () => {
     const pose = (x: number) =>
       encode("pose_t", {
         utime: 1n,
@@ -73,7 +73,7 @@ describe("a log in the page", () => {
     );
   }
 
-  it("tells what is wanted, once, with all its parts, and another scene when it is time", async () => {
+  it("sends the wanted channels once, with all their parts, and another scene when it is time", async () => {
     const log = logOf([
         [0, 1, [[10]]],
         [0, 2, [[20], [21]]],

@@ -21,7 +21,7 @@ describe("a place", () => {
     expect(hashOf(nothing)).toBe("#");
   });
 
-  it("has nothing that is not there, or is no number", () => {
+  it("has no missing values and no texts", () => {
     for (const hash of [
       "",
       "#",

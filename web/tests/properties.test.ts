@@ -69,10 +69,10 @@ describe("a model's properties", () => {
   });
 });
 
-describe("a message that is written", () => {
+describe("an encoded message", () => {
   const drive = { utime: 0, vx: 0.5, vy: 0, omega: -1 };
 
-  it("is one of its type", () => {
+  it("decodes as its type", () => {
     const bytes = encode(
       "velocity_command_t",
       checkedMessage("velocity_command_t", drive) as never,

@@ -40,7 +40,7 @@ describe("a video that is stopped at once", () => {
     expect(recorder.stops).toBe(1);
   });
 
-  it("ends without one where none is drawn", async () => {
+  it("ends without a picture if none is drawn", async () => {
     const [video, recorder] = await recorded(false);
     expect(video!.size).toBe(0);
     expect(recorder.stops).toBe(1);

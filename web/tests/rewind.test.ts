@@ -132,7 +132,7 @@ describe("the past", () => {
     expect(last()![1]).toBe(kMostSeconds);
   });
 
-  it("ends where the world begins anew", () => {
+  it("ends where the world is reset", () => {
     come(5);
     rewind.show(5);
     hand.handler.message("ruedo/world", state(0, 7, 1));
@@ -141,7 +141,7 @@ describe("the past", () => {
     expect(rewind.range).toEqual({ begin: 0, end: 0 });
   });
 
-  it("has what was drawn, all layers of it, however long ago", () => {
+  it("has all layers of drawings, however old", () => {
     const drawn: Record<string, number> = {};
     hand.handler.hello({ mode: "live" } as Hello);
     vi.spyOn(rewind["handler"], "message").mockImplementation((channel, bytes) => {

@@ -140,7 +140,7 @@ describe("a message", () => {
     expect(called).toContain("bodies.turnWheels 1");
   });
 
-  it("of the run is not taken before all is loaded; what is loaded and answered is", () => {
+  it("of the run wait until all is loaded; loaded files and replies do not", () => {
     const { router, called } = made(false);
     router.onMessage("a/pose", kPose);
     router.onMessage("ruedo/tick", encodeEmpty("tick_t"));

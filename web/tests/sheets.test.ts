@@ -26,6 +26,6 @@ it("tiles beside each other do not lie on each other, nor on what is far below",
   expect(levels(...tiles, sheet([-9, -9], [9, 9], -0.5))).toEqual([0, 0, 0, 0]);
 });
 
-it("what is thick is as it is", () => {
+it("thick parts stay as they are", () => {
   expect(levels(sheet([0, 0], [1, 1], 0.01, false), sheet([-9, -9], [9, 9], 0))).toEqual([0, 0]);
 });

@@ -116,8 +116,8 @@ describe("the world that is shown", () => {
   });
 });
 
-describe("what the link is asked for", () => {
-  it("is nothing before the views are there, then what page and views need", () => {
+describe("the requests to the link", () => {
+  it("is empty before the views exist, then the needs of page and views", () => {
     const want = vi.fn(),
       watchTraffic = vi.fn(),
       page = pageWith({ world: worldOf(1), complete: true }),
@@ -141,7 +141,7 @@ describe("what the link is asked for", () => {
   });
 });
 
-describe("what is chosen", () => {
+describe("the choice", () => {
   it("is a robot that is there, the next one after the last is the first", () => {
     const page = pageWith({ world: worldOf(1, "a", "b"), robot: 0 });
     chooseRobot(page, 5);

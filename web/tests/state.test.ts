@@ -87,7 +87,7 @@ function state(more: Partial<PageState> = {}): PageState {
 }
 
 describe("the store", () => {
-  it("tells who watches what has changed, and nobody else", () => {
+  it("notifies the watchers of a change, and no others", () => {
     const store = new Store({ a: 1, b: "x" }),
       a: number[] = [],
       both: string[] = [];
@@ -141,7 +141,7 @@ describe("the clock", () => {
     expect([page.now.time_s, clock.epoch, forgotten]).toEqual([0, 1, 3]);
   });
 
-  it("goes back by as little as is asked for, when the state has come", () => {
+  it("goes back by the smallest requested time, when the state has arrived", () => {
     const page = new Store(state()),
       clock = clockOf(page);
     clock.tell(3, 0, true);
@@ -174,7 +174,7 @@ describe("wanted channels", () => {
   const of = (robot: string, ...types: string[]) => types.map((type) => `${robot}/${type}`);
   const own = ["ruedo/info", "ruedo/tick", "ruedo/world", "ruedo/reply", "ruedo/markers"];
 
-  it("are none before the greeting, then what runs, and messages of the run when all is there", () => {
+  it("none before the greeting, then the world, and messages of the run when all is loaded", () => {
     expect([...wantedChannels(state({ hello: null }), [])]).toEqual([]);
     expect([...wantedChannels(state({ world: null }), [])]).toEqual(["ruedo/info", "ruedo/reply"]);
     expect([...wantedChannels(state({ complete: false }), [])].sort()).toEqual([
@@ -213,7 +213,7 @@ describe("wanted channels", () => {
   });
 });
 
-it("what is said of the run", () => {
+it("the notes about the run", () => {
   const log = {
       mode: "log",
       title: "",
@@ -252,7 +252,7 @@ describe("how a layer is drawn", () => {
     expect(displayFor(new Map(), "points", "b")).toEqual(usual);
     expect(displayFor(new Map(), "clouds", "b")).toEqual({ ...usual, colouring: "range" });
   });
-  it("takes nothing that is out of its limits", () => {
+  it("refuses values out of its limits", () => {
     for (const wrong of [{ opacity: 2 }, { decay_s: -1 }, { size: null }, { colouring: "x" }])
       expect(displaysOf(JSON.stringify([["a", { ...usual, ...wrong }]])).size).toBe(0);
     expect(displaysOf("{").size).toBe(0);

@@ -15,7 +15,7 @@ describe("the time line", () => {
     expect(eventBefore([], 1)).toBeNull();
   });
 
-  it("begins anew at the end of what is looped, but only what played", () => {
+  it("restarts at the end of the loop, if it was playing", () => {
     const whole = { loop: true, marks: { begin: null, end: null } },
       part = { loop: true, marks: { begin: 2, end: 3 } };
     const shown = (now: number) => ({ begin: 0, end: 10, now, speed: 1, playing: true });

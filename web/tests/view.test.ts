@@ -208,7 +208,7 @@ describe("a crowd", () => {
   });
 });
 
-it("shadows are drawn anew where something moved, or the sun looks elsewhere", () => {
+it("shadows are drawn again if something moved, or the sun's view did", () => {
   const lights = new Lights(),
     sun = {
       type: "directional",

@@ -10,7 +10,7 @@ export default async function compare({ page, given, seen, until, check, picture
   );
   await page.evaluate(() => window.ruedo.link.play(false, 1));
   await page.getByRole("tab", { name: "Plots" }).click();
-  await until("the first difference is told", () => document.getElementById("difference-words"));
+  await until("the first difference is shown", () => document.getElementById("difference-words"));
   const words = await page.locator("#difference-words").innerText();
   check(
     "it is that of the logs",

@@ -116,7 +116,7 @@ export default async function controls(tools) {
   await stands("(it stands)");
   const after = await place(),
     went = Math.hypot(after[0] - before[0], after[1] - before[1]);
-  check("it went as far as was asked", Math.abs(went - 0.4) < 0.02, `${went} m`);
+  check("it went the requested distance", Math.abs(went - 0.4) < 0.02, `${went} m`);
 
   // ---- layers
   const chosen = await page.evaluate(() => [...window.ruedo.page.now.layers]);
@@ -345,7 +345,7 @@ export default async function controls(tools) {
   await page.waitForTimeout(3000);
   const second = await server(),
     pace = ((second.utime - first.utime) * 1e-3) / (second.answered_ms - first.asked_ms);
-  check("at a quarter of the rate the clock goes a quarter as fast", pace < 0.3 && pace > 0, pace);
+  check("at a quarter of the rate the clock runs a quarter as fast", pace < 0.3 && pace > 0, pace);
   await rated("as fast as it goes is a rate, too", "max", Infinity);
   await rated("(a rate of one)", "1", 1);
 

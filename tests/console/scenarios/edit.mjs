@@ -65,7 +65,7 @@ export default async function edit({ page, seen, until, check, picture, still, o
         };
       return picture(false) !== picture(true);
     });
-    check("what is being drawn is seen", differs, "the same picture without it");
+    check("the unfinished drawing is visible", differs, "the same picture without it");
   });
   await has("room");
   check(

@@ -144,7 +144,7 @@ export default async function events({ page, until, check, seen, ready, given, p
 async function live({ page, until, seen }) {
   const has = (kind, text) =>
     until(
-      `a ${kind} is told`,
+      `a ${kind} is reported`,
       ([wanted, words]) =>
         window.ruedo.page.now.events.some((e) => e.kind === wanted && e.text.includes(words)),
       [kind, text],
@@ -160,7 +160,7 @@ async function live({ page, until, seen }) {
   await page.getByLabel("events", { exact: true }).selectOption("collision");
   await page.keyboard.press("<");
   await until(
-    "the past is jumped into",
+    "a click jumps to the past",
     ([from, to]) => {
       const { past } = window.ruedo.page.now;
       return past && past.now >= from - 1e-6 && past.now <= to;

@@ -22,7 +22,7 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
     found.join(),
   );
   await until(
-    "and its statistics are told",
+    "and its statistics are shown",
     (text) => document.querySelector(".statistics .number")?.textContent === text,
     String(Number(least.toPrecision(5))),
   );

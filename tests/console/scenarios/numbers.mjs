@@ -42,6 +42,6 @@ export default async function numbers({ page, until, check, ready, server }) {
   const asked = await page.evaluate(() =>
     window.ruedo.page.now.events.filter(({ kind }) => kind === "request").map(({ text }) => text),
   );
-  check("and nothing is asked of the run", asked.length === 0, asked.join());
+  check("and sends no request to the run", asked.length === 0, asked.join());
   check("nor is it an edit", await page.evaluate(() => window.ruedo.page.now.edits.changes === 0));
 }

@@ -5,8 +5,8 @@ export default async function odd({ page, until, check, ready, server, expect, p
   await ready();
   const noted = (what, words) =>
     until(what, (text) => window.notes.some((note) => new RegExp(text).test(note)), words);
-  await noted("what is missing in the world is told", "^Parts of this world are missing");
-  await noted("a robot that fell is told", "^falling has fallen out of the world");
+  await noted("missing parts of the world are reported", "^Parts of this world are missing");
+  await noted("a fallen robot is reported", "^falling has fallen out of the world");
   await page.locator("#canvas").focus();
   await page.keyboard.press(" ");
   await until("(paused)", () => document.getElementById("state").textContent === "paused");
@@ -15,7 +15,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
   );
   await page.evaluate(() => window.ruedo.choose(0));
   await page.keyboard.press("w");
-  await noted("driving while paused is told", "The run is paused");
+  await noted("driving while paused gives a note", "The run is paused");
   const ring = await page.locator("#canvas").evaluate((canvas) => {
     const { outlineStyle, outlineWidth } = getComputedStyle(canvas);
     return outlineStyle !== "none" && parseFloat(outlineWidth) >= 2;
@@ -116,7 +116,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
     window.loss = context.getExtension("WEBGL_lose_context");
     window.loss.loseContext();
   });
-  await until("lost graphics are told", () =>
+  await until("lost graphics are reported", () =>
     /3-D graphics/.test(document.getElementById("notice").textContent),
   );
   await page.evaluate(() => window.loss.restoreContext());

@@ -17,8 +17,8 @@ export default async function offers({ page, given, until, check, picture }) {
   if (given.is === "bare") {
     check("no motions are offered where no robot is", !motions && !pad);
     check("no choice of robots", !(await seen(".robots")) && !(await seen(".find")));
-    check("it says so", /no robot/.test(await page.locator(".page").innerText()));
-    check("nothing that robots sense", chips.join() === "shapes", chips.join());
+    check("it shows a note", /no robot/.test(await page.locator(".page").innerText()));
+    check("no samples of robots", chips.join() === "shapes", chips.join());
     await page.getByRole("tab", { name: "Plots" }).click();
     check("no plots of a robot", (await page.locator(".u-title:visible").count()) === 0);
   } else if (given.is === "log") {
@@ -29,10 +29,13 @@ export default async function offers({ page, given, until, check, picture }) {
       !(await seen('[aria-label^="reset"]')) && !(await seen("[data-tool]")),
     );
   } else if (given.is === "watched") {
-    check("who watches is offered no requests", await page.locator("#pause").isDisabled());
+    check(
+      "a viewer without control has no request buttons",
+      await page.locator("#pause").isDisabled(),
+    );
     await page.waitForTimeout(1000);
     const notes = await page.evaluate(() => window.notes.join());
-    check("and hears no complaint", notes === "", notes);
+    check("and gets no error", notes === "", notes);
   } else {
     check("there is a chip for the roof", chips.includes("roof"), chips.join());
     const height = () =>
@@ -42,10 +45,10 @@ export default async function offers({ page, given, until, check, picture }) {
           .getBoundingClientRect();
         return window.ruedo.stage.picker.pick(left + width / 2, top + height / 2).point?.z ?? 0;
       });
-    check("what is below the roof is seen and clicked", (await height()) < 2, await height());
+    check("things below the roof are visible and clickable", (await height()) < 2, await height());
     await picture("hall");
     await page.locator('[data-layer="roof"]').click();
-    check("the roof, where it is wanted", (await height()) > 2.9, await height());
+    check("the roof, if chosen", (await height()) > 2.9, await height());
     const away = await page.evaluate(() => {
       const { stage } = window.ruedo;
       const corners = [-5, 5].flatMap((x) => [-4, 4].flatMap((y) => [0, 2].map((z) => [x, y, z])));

@@ -10,7 +10,7 @@ export default async function save({ page, seen, told, until, check }) {
   const asked = async (answer) => {
     await page.locator("#save").click();
     const dialog = page.locator("dialog[open]");
-    check("it is asked", /another program/.test(await dialog.innerText()));
+    check("it asks for a confirmation", /another program/.test(await dialog.innerText()));
     await dialog.getByRole("button", { name: answer }).click();
   };
   const noted = (what, words) =>

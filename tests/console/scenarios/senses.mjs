@@ -43,7 +43,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
     return canvas?.width === 64 && canvas.height === 48;
   });
   await page.locator(".inset canvas").hover();
-  await until("a depth is told under the pointer: the wall's, 2.9 m ahead of the camera", () => {
+  await until("a depth is shown under the pointer: the wall's, 2.9 m ahead of the camera", () => {
     const [, metres] = /here ([\d.]+) m/.exec(
       document.querySelector(".inset figcaption").textContent,
     ) ?? [0, NaN];
@@ -51,7 +51,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
   });
   await page.locator("#inset").selectOption("probe/CLASSES");
   await page.locator(".inset canvas").hover();
-  await until("a class is told under the pointer, with the model that has it", () =>
+  await until("a class is shown under the pointer, with the model that has it", () =>
     /here label 40 wall$/.test(document.querySelector(".inset figcaption").textContent),
   );
   check(
@@ -61,7 +61,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
   );
   await page.locator("#inset").selectOption("probe/HEAT");
   await page.locator(".inset canvas").hover();
-  await until("a temperature is told under the pointer: the wall's", () =>
+  await until("a temperature is shown under the pointer: the wall's", () =>
     /dark to bright: .* K · here 310\.00 K$/.test(
       document.querySelector(".inset figcaption").textContent,
     ),
@@ -77,7 +77,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
     before,
   );
   await page.getByRole("tab", { name: "Robot" }).click();
-  await until("joints are told", () =>
+  await until("joints are shown", () =>
     /shoulder-?\d/.test(document.getElementById("joints")?.textContent ?? ""),
   );
   const slider = page.getByLabel("move shoulder");
