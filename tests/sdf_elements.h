@@ -121,7 +121,7 @@ inline std::string attributes(const std::string& element, const std::string& pat
   return " name='n'";
 }
 
-// What an element needs beside the one under test.
+// The elements that are needed beside the one under test.
 inline std::vector<std::string> beside(const std::string& element, const std::string& path) {
   const bool in_state = path.starts_with("world/state");
   if (element == "world" && in_state)
@@ -264,7 +264,7 @@ inline Outcome load(const Row& row, bool with, const Loader& loader) {
   return outcome;
 }
 
-// What is reported for a world with the element, and not for the same world without it.
+// The findings of a world with the element that the same world without it does not have.
 inline bool is_named(const Row& row, const Outcome& with, const Loader& loader) {
   const Outcome without = load(row, false, loader);
   return std::any_of(with.findings.begin(), with.findings.end(), [&](const std::string& text) {
@@ -272,7 +272,7 @@ inline bool is_named(const Row& row, const Outcome& with, const Loader& loader) 
   });
 }
 
-// Elements that are named by a word for something else: the fog as a whole, the kind of a joint.
+// Elements that findings report by another word: the fog as a whole, the kind of a joint.
 inline bool is_told_of(const Row& row, const Outcome& with) {
   static const ByEnd kWords = {
       {"fog/color", "<fog>"},         {"fog/start", "<fog>"},
@@ -331,7 +331,7 @@ inline bool is_of_no_effect(const std::string& path) {
   });
 }
 
-// The paths of elements that nobody reads and nothing names, one per line.
+// The paths of elements that no reader reads and no finding reports, one per line.
 inline std::string silent_ones(const std::function<bool(const std::string&)>& wanted,
                                const Loader& loader) {
   std::set<std::string> named;  // whose parts say no more

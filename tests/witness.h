@@ -1,5 +1,5 @@
-// Whether the machine, not the program under test, was at fault: the only ground on which a test
-// begins anew. tests/witness.py is its twin, and reads the threshold here.
+// Whether the machine, not the program under test, was at fault: the only reason for which a test
+// restarts. tests/witness.py is its twin, and reads the threshold here.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 
 namespace ruedo {
 
-// A thread that sleeps has to wake within this time; where it does not, all of the machine's
-// programs were held up. A machine that is busy gives each thread its turn sooner.
+// A thread that sleeps has to wake within this time; if it does not, all of the machine's programs
+// stood still. A machine that is busy gives each thread its turn sooner.
 inline constexpr double kHeldUp_s = 0.25;
 
 class Witness {

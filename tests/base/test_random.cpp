@@ -169,7 +169,7 @@ TEST(RandomSource, ReseedingEqualsAFreshSource) {
   EXPECT_EQ(source.seed(), 7u);
   EXPECT_EQ(copy.stream(5).bits(), RandomSource(7, "p3at", "lrf").stream(5).bits());
   EXPECT_NE(copy.stream(5).bits(), first);
-  // What was begun goes on.
+  // A sequence that was begun continues.
   RandomStream same = RandomSource(1, "p3at", "lrf").stream(5);
   same.bits();
   EXPECT_EQ(begun.bits(), same.bits());

@@ -168,7 +168,7 @@ TEST_F(Multicast, AnnouncedSizesAllocateNothing) {
   EXPECT_TRUE(heard_.empty());
 }
 
-// What no fragment brought is not made up: no memory of ours goes out in a message.
+// Missing fragments are not filled: no memory of ours gets into a message.
 TEST_F(Multicast, DropsMessagesWithGaps) {
   std::vector<Bytes> parts = fragments("c", Bytes(300, 3), 1, 100);
   parts[1][15] = 50;  // its offset: over the first, with a gap behind

@@ -1,4 +1,4 @@
-// What the C++ client sends by multicast, as LCM's own library receives it.
+// LCM's own library receives the multicast messages of the C++ client.
 #include "bus/multicast_sender.h"
 
 #include <algorithm>

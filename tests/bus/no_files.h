@@ -32,8 +32,8 @@ class NoFiles {
   std::vector<int> taken_;
 };
 
-// A server of this process, at that address, has no descriptor for who connects: it waits, and
-// does not try again and again.
+// A server of this process, at that address, has no descriptor for a connection: it waits, and
+// does not retry all the time.
 template <class Address>
 void newcomer_costs_nothing(int newcomer, const Address& address) {
   const NoFiles none;

@@ -71,7 +71,7 @@ struct Stock {
   }
 };
 
-// The number of messages that the client has, once all that were published so far have arrived.
+// The number of messages that the client has, once all published ones have arrived.
 int settled(Served& served, const Stock& client, const std::string& channel) {
   const std::vector<uint8_t> marker(10);
   served.publish(channel, marker);
@@ -213,7 +213,7 @@ TEST(TcpqServer, ASlowClientLosesMessagesAndDelaysNoOther) {
   ASSERT_TRUE(soon([&] { return served.publish("out", {1}), quick.count > 0; }));
   const std::vector<uint8_t> block(60'000);
   for (int i = 0; i < 2000; ++i) {  // 120 MB: more than the kernel and the ring hold
-    served.publish("bulk", block);  // who waited for the slow one here would do so for ever
+    served.publish("bulk", block);  // waiting for the slow client here would last for ever
     if (i % 100 != 0) continue;
     const int before = quick.count;
     ASSERT_TRUE(soon([&] { return served.publish("out", {1}), quick.count > before; })) << i;

@@ -15,8 +15,8 @@ using Bytes = std::vector<uint8_t>;
 
 Bytes bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
-// What LCM 1.5.3 for Python sends on subscribe("ruedo/in.*"), publish("x", b"abc"), unsubscribe of
-// p3at/lrf.
+// The bytes of LCM 1.5.3 for Python on subscribe("ruedo/in.*"), publish("x", b"abc"), unsubscribe
+// of p3at/lrf.
 const std::string kHello("\x28\x76\x17\xfb\0\0\x01\0", 8);
 const std::string kStock(
     "\0\0\0\2\0\0\0\x0aruedo/in.*\0\0\0\1\0\0\0\1x\0\0\0\3abc\0\0\0\3\0\0\0\x08p3at/lrf", 50);
@@ -166,7 +166,7 @@ TEST(MessageRing, KeepsTheNewest) {
     all.emplace_back(i, Bytes(random() % (ring.largest() + 1), static_cast<uint8_t>(i)));
     places.push_back(ring.end());
     ASSERT_TRUE(ring.append(i, all.back().second));
-    // What is left is the end of the stream, complete and in order, and at least the last message.
+    // The rest is the end of the stream, complete and in order, and at least the last message.
     size_t kept = 0;
     for (uint64_t place = ring.begin(); place < ring.end(); ++kept) place = ring.at(place).next;
     ASSERT_GE(kept, 1u);

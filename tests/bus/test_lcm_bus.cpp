@@ -1,5 +1,5 @@
-// Addresses, channel patterns, and the bus on memq. What needs the network is tested in tests/cli,
-// in a namespace.
+// Addresses, channel patterns, and the bus on memq. Tests with the network are in tests/cli, in a
+// namespace.
 #include "bus/lcm_bus.h"
 
 #include <algorithm>

@@ -144,7 +144,7 @@ TEST(UnixServer, IsPrivateToItsUser) {
   ASSERT_EQ(::stat(served.folder.url().host.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 07777, 0600u);
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
-  fs::permissions(served.folder.path, fs::perms::all);  // and even who could open it
+  fs::permissions(served.folder.path, fs::perms::all);  // and even for one who could open it
   ASSERT_EQ(::chmod(served.folder.url().host.c_str(), 0666), 0);
   const pid_t stranger = ::fork();
   if (stranger == 0) {
@@ -407,7 +407,7 @@ TEST(UnixServer, OneOfTwoSimultaneousServersServes) {
       }
       try {
         listener = listen_unix(path);
-      } catch (const EnvironmentError&) {  // it is taken
+      } catch (const EnvironmentError&) {  // it is in use
       }
     };
     std::thread other([&] { begin(listeners[1]); });

@@ -385,7 +385,7 @@ TEST_F(TapTest, AcceptsCommandsOnTheRunsInputsOnly) {
   EXPECT_FALSE(tap.takes("c"));
 }
 
-// The state of the bodies is there for those who come when no other one will be told.
+// Later viewers get the state of the bodies when no further one will be published.
 TEST_F(TapTest, KeepsTheNewestStateForLaterViewers) {
   auto announced = std::make_shared<run::Announcement>();
   announced->channels.add<world_state_t>("ruedo/world", "", "", {});
@@ -444,7 +444,7 @@ TEST_F(TapTest, TwoThreadsOfferWithoutLoss) {
   EXPECT_THAT(offered(), testing::SizeIs(2 * kEach));
 }
 
-// A viewer that has just come, or just said what it wants, gets the reply to its next request.
+// A viewer that has just come, or just subscribed, gets the reply to its next request.
 TEST_F(TapTest, AViewerMissesNothingAfterItsFirstMessage) {
   const auto world = std::make_shared<const world::WorldModel>();
   Stage stage;
@@ -466,7 +466,7 @@ TEST_F(TapTest, AViewerMissesNothingAfterItsFirstMessage) {
   };
   const std::vector<uint8_t> want_a{static_cast<uint8_t>(Operation::want), 'a'};
 
-  stage.source->pump(stage.board, false);  // nobody is there
+  stage.source->pump(stage.board, false);  // without a viewer
   Viewer viewer(stage);
   viewer.on_message(want_a);
   publish(0);  // the first on its channel
@@ -476,7 +476,7 @@ TEST_F(TapTest, AViewerMissesNothingAfterItsFirstMessage) {
 
   Viewer late(stage);
   publish(1);
-  EXPECT_EQ(seen(late), 0u);  // it wants nothing
+  EXPECT_EQ(seen(late), 0u);  // it has no subscription
   late.on_message(std::vector<uint8_t>{static_cast<uint8_t>(Operation::want), 'b'});
   publish(1);
   EXPECT_EQ(seen(late), 1u);

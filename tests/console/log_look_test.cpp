@@ -1,4 +1,4 @@
-// What one viewer of a log asks for holds nobody up for long.
+// A viewer's requests to a log delay no other viewer for long.
 #include "console/log_source.h"
 
 #include <algorithm>
@@ -79,7 +79,7 @@ TEST(LogLook, ReadsSoMuchAtATime) {
   EXPECT_EQ(shown(beside), 1);
 }
 
-// Of two viewers, 256 MB: six messages of 40 MB. Where nobody looks any more, there is room again.
+// For two viewers 256 MB: six messages of 40 MB. A viewer that leaves frees its room.
 TEST(LogLook, HoldsSoMuchForAllViewers) {
   const SparseLog log(4, 2, kLarge);
   LogSource source(log.path(), {}, 1.0);

@@ -1,4 +1,4 @@
-// What one input may cost. CPU time is measured here, since a slow input is a finding, too, and
+// The budget of one input. CPU time is measured here, since a slow input is a finding, too, and
 // wall time would depend on the machine's load. libFuzzer measures the memory (-malloc_limit_mb,
 // -rss_limit_mb).
 #pragma once

@@ -22,7 +22,7 @@
 #include "run/requests/control.h"
 #include "run/requests/request_table.h"
 
-// There is no world here: what would act on one is never called.
+// Without a world: functions that act on one are never called.
 namespace ruedo::engine {
 world::Fault fault_of(const fault_t&) { return {}; }
 void Faults::begin(const world::Fault&, RobotIndex, int64_t) { std::abort(); }
@@ -84,7 +84,7 @@ class Choices {
   const uint8_t *data_, *end_;
 };
 
-// What the run does around its mode and its control, without a world.
+// The run around its mode and its control, without a world.
 class Conversation {
  public:
   explicit Conversation(uint8_t policy)
@@ -197,7 +197,7 @@ class Conversation {
     request.kind = request_t::JOIN;
     request.run_id = kRunId;
     request.epoch = -1;
-    request.sequence = 1'000'000 * (client + 1) + ++joins_;  // random, where it is no test
+    request.sequence = 1'000'000 * (client + 1) + ++joins_;  // random, except in a test
     request.body = engine::encoded(body);
     request.size = static_cast<int32_t>(request.body.size());
     const std::vector<uint8_t> bytes = engine::encoded(request);
@@ -220,7 +220,7 @@ class Conversation {
 
   // The first client, which behaves correctly.
   void good_grants(int64_t from, int64_t until) {
-    last_code_ = reply_t::OK;  // there is no reply to a grant that is taken at once
+    last_code_ = reply_t::OK;  // a grant that is accepted at once has no reply
     send(request_t::GRANT, 0, next(0), engine::encoded(granting(from, until, published_)));
     if (last_code_ != reply_t::OK) fail(("a good grant is refused: " + last_text_).c_str());
   }
@@ -281,7 +281,7 @@ class Conversation {
     control_.serve();
   }
 
-  // Some seconds pass; whoever was silent for ten has lost its lease. The first client is heard.
+  // Some seconds pass; a client that was silent for ten has lost its lease. The first one is heard.
   void attend(int seconds) {
     std::vector<Session> sessions = control_.sessions().list();
     const auto now = std::chrono::steady_clock::now() + std::chrono::seconds(clock_s_ += seconds);

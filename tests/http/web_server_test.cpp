@@ -81,11 +81,11 @@ std::unique_ptr<WebServer> server_at(int port) {
   return std::make_unique<WebServer>(place, WebHandler{});
 }
 
-// What is wrong when so many start in the same moment.
+// The errors when so many start in the same moment.
 std::vector<std::string> started_at_once(int servers, int port) {
   std::vector<std::string> faults;
   std::mutex mutex;
-  std::barrier begin(servers), end(servers);  // nobody gives its port back before all have tried
+  std::barrier begin(servers), end(servers);  // no server frees its port before all have tried
   std::vector<std::jthread> threads;
   for (int i = 0; i < servers; ++i) {
     threads.emplace_back([&] {
@@ -117,7 +117,7 @@ TEST(WebServer, ServersOnPortZeroAllStart) {
   for (int round = 0; round < 20; ++round) EXPECT_THAT(started_at_once(4, 0), testing::IsEmpty());
 }
 
-// Of those who have been given something and are still there.
+// Clients that have got a message and are still connected.
 struct Given {
   std::atomic<int> now{0}, most{0};
 };
@@ -166,7 +166,7 @@ FileHandle viewer_of(int port) {
   return one;
 }
 
-// What comes until that is in it, or until the end.
+// The bytes received until they contain that, or until the end.
 std::string heard_of(const FileHandle& from, const std::string& enough) {
   std::string heard;
   char bytes[4096];

@@ -1,5 +1,5 @@
-// What passes under a rule of a comparison: the laws that docs/regressions.md states, on values
-// that were drawn, and on those where numbers are odd.
+// Values that pass under a rule of a comparison: the laws of docs/regressions.md, on random values
+// and on special ones.
 #include <gmock/gmock.h>
 
 #include <array>

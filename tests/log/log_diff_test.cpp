@@ -167,7 +167,7 @@ TEST_F(LogDiffTest, ArraysOfDifferentLengths) {
   EXPECT_TRUE(fields.contains("nranges"));
 }
 
-// A range finder says inf where it has no echo: that is no distance which a tolerance could widen.
+// A range finder gives inf without an echo: a tolerance does not apply to that.
 TEST_F(LogDiffTest, NoToleranceCoversAMissingEcho) {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();

@@ -1,4 +1,4 @@
-// What a log may hold that nobody recorded.
+// Forged and damaged logs.
 #include "log/reader.h"
 
 #include <cstdint>
@@ -103,7 +103,7 @@ TEST_F(LogOfOneMessage, IsReadUpToTheLargestPicture) {
   EXPECT_FALSE(is_read());
 }
 
-// What would not be read is not written, and what came before it is there.
+// An unreadable event is not written, and the events before it are complete.
 TEST_F(LogOfOneMessage, IsWrittenUpToThere) {
   Writer log(path_);
   log.write(0, "a", nullptr, 0);

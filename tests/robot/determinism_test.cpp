@@ -44,7 +44,7 @@ void expect_same_bits(const std::string& type, int steps) {
   const std::vector<Pose> second = ram(type, steps);
   ASSERT_EQ(first.size(), second.size());
   const auto same = [](const Pose& a,
-                       const Pose& b) {  // a Pose has bytes between its parts that are nobody's
+                       const Pose& b) {  // a Pose has padding bytes
     return std::memcmp(a.rotation.coeffs().data(), b.rotation.coeffs().data(),
                        4 * sizeof(double)) == 0 &&
            std::memcmp(a.translation.data(), b.translation.data(), 3 * sizeof(double)) == 0;

@@ -115,7 +115,7 @@ TEST_F(Gimbal, ALimitOfEffortComesByMessage) {
   sim.run(0.5);
   const double inertia = 0.2;  // head and eye
   EXPECT_NEAR(rate("pan"), 0.1 / inertia * 0.5, 2e-3);
-  tell("pan", joint_command_t::EFFORT_LIMIT, 0.2);  // what it was told already goes on within it
+  tell("pan", joint_command_t::EFFORT_LIMIT, 0.2);  // the earlier command continues within it
   sim.run(0.5);
   EXPECT_NEAR(rate("pan"), (0.1 + 0.2) / inertia * 0.5, 4e-3);
 }

@@ -294,7 +294,7 @@ TEST(KinematicContact, CollisionsAreWithNeitherTheFloorNorTheCargo) {
   }
 }
 
-// What has come to rest against something still reports the contact. A robot on wheels rolls back
+// A robot at rest against something still reports the contact. One on wheels rolls back
 // from the wall by some 0.1 mm once its wheels push no more.
 TEST(KinematicContact, AsleepAtAWallItStillTouchesIt) {
   for (const char* drive : {"kinematic", "wheels"}) {

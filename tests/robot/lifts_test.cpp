@@ -1,4 +1,4 @@
-// Lifts that are called by floor, and doors that are told to open: of gz-sim, Gazebo Classic and
+// Lifts that are called by floor, and doors that open on command: of gz-sim, Gazebo Classic and
 // RMF.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -56,7 +56,7 @@ TEST(OwnDrive, ReportsADriveThatCannotBeCopied) {
   }
   const Vec3 before = sim.position();
   sim.velocity(0.3, 0.0);
-  sim.run(0.5);  // what was to be copied goes on
+  sim.run(0.5);  // the original continues
   EXPECT_GT(sim.position().x(), before.x() + 0.1);
 }
 

@@ -80,7 +80,7 @@ TEST_P(OnWheels, AnAdvanceEndsOneMetreAhead) {
   ASSERT_TRUE(done(sim));
   const Vec3 way = start.rotation.conjugate() * (sim.position() - start.translation);
   EXPECT_NEAR(way.x(), 1.0, 2e-3);
-  EXPECT_NEAR(way.y(), 0.0, 5e-3);  // no encoder tells of what slips sideways
+  EXPECT_NEAR(way.y(), 0.0, 5e-3);  // encoders do not measure sideways slip
   EXPECT_NEAR(sim.yaw(), 0.4, 3e-3);
   EXPECT_LT(sim.robot().twist.linear.norm(), 5e-3);
   sim.run(1.0);  // and stays there

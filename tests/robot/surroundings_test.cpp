@@ -1,4 +1,4 @@
-// Conveyor belts, and doors that open for whoever comes near.
+// Conveyor belts, and doors that open when somebody comes near.
 #include <cmath>
 
 #include <gtest/gtest.h>

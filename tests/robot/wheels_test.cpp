@@ -49,7 +49,7 @@ double run_until_done(Sim& sim) {
   return 0.0;
 }
 
-// What a client sees when the primitive reports its end: the robot has arrived, and stands.
+// When the primitive reports its end, the robot has arrived, and stands.
 TEST(Wheels, APrimitiveEndsAtItsGoalAndAtRest) {
   struct Case {
     double acceleration, deceleration, seconds;
@@ -85,7 +85,7 @@ TEST(Wheels, SkidSteeringTurnsAsCoulombHasIt) {
   }
 }
 
-// The wheels turn at the rates they are told.
+// The wheels turn at the commanded rates.
 TEST(Wheels, WheelCommandsAreWheelRates) {
   Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(5, 50, 50, 50, 50)));
   sim.robots.apply({RobotIndex(0), WheelCommand{{2.0, 3.0}}});

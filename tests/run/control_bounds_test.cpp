@@ -1,4 +1,4 @@
-// What one client asks for is bounded, and delays nobody else: STEPs, sequences, sessions, texts,
+// Requests of a client are limited, and delay no other client: STEPs, sequences, sessions, texts,
 // requests before the first state.
 #include <gtest/gtest.h>
 
@@ -189,7 +189,7 @@ TEST(Places, GoToNewcomersWithinSeconds) {
   for (size_t i = 0; i < Sessions::kMostSessions - 11; ++i)
     ASSERT_NE(sessions.join("new", 1000 + static_cast<int64_t>(i), keeps), nullptr) << i;
   for (size_t i = 0; i < 10; ++i)
-    EXPECT_NE(sessions.find(ids[i]), nullptr) << i;  // who only joined gives way first
+    EXPECT_NE(sessions.find(ids[i]), nullptr) << i;  // clients that only joined are replaced first
   ASSERT_NE(sessions.join("new", 2000, keeps), nullptr);
   EXPECT_EQ(sessions.find(ids[3]), nullptr);  // then the most silent
   for (int64_t i = 1; i < 10; ++i) ASSERT_NE(sessions.join("new", 2000 + i, keeps), nullptr) << i;
@@ -197,7 +197,7 @@ TEST(Places, GoToNewcomersWithinSeconds) {
   EXPECT_NE(sessions.find(kept), nullptr);
 }
 
-// A process that is stopped hears nobody, wherever the stop falls between two looks at the clock.
+// A stopped process hears no client, wherever the stop falls between two looks at the clock.
 TEST(Silence, DoesNotCountWhileTheProcessIsStopped) {
   Sessions sessions;
   Session* session = sessions.join("patient", 1);

@@ -5,7 +5,7 @@
 
 namespace ruedo::run {
 
-uint64_t allocations();  // calls of operator new so far, in all threads
+uint64_t allocations();  // calls of operator new, in all threads
 
 // While one lives, the call of operator new with that number from here on, in any thread, throws.
 class FailingAllocation {

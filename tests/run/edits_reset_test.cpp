@@ -50,7 +50,7 @@ TEST_F(EditsResetTest, AResetOfTheTimeMovesNothing) {
   const auto odometry = on<odometry_t>("r/odometry", from);
   ASSERT_GE(odometry.size(), 13u);
   EXPECT_EQ(odometry[0].utime, 0);
-  EXPECT_NEAR(odometry[0].x, 0.125, 1e-9);  // it goes on, too
+  EXPECT_NEAR(odometry[0].x, 0.125, 1e-9);  // it continues, too
   EXPECT_EQ(odometry[1].utime, 20'000);
   EXPECT_NEAR(odometry[1].x, 0.135, 1e-9);
   for (const imu_t& sample : on<imu_t>("r/imu", from))
@@ -74,7 +74,7 @@ TEST_F(EditsResetTest, ThePosesAloneAreAsTheyWere) {
   const reply_t reply = reset(reset_request_t::POSES);
   ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
   EXPECT_EQ(reply.epoch, 0);
-  EXPECT_EQ(reply.utime, 1'000'000);  // goes on
+  EXPECT_EQ(reply.utime, 1'000'000);  // continues
   EXPECT_EQ(state("box").position[2], 2.0);
   EXPECT_EQ(state("box").linear[2], 0.0);
   EXPECT_NEAR(state("r").position[0], 0.0, 1e-12);
@@ -176,8 +176,8 @@ TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
   EXPECT_GT(verification.messages, 300);
 }
 
-// The robot that is waited for goes and comes back, and the time is reset meanwhile: the run goes
-// on, and no further than the messages allow while the robot is there.
+// The robot that the run waits for is removed and restored, and the time is reset meanwhile: the
+// run continues, and no further than the messages allow while the robot exists.
 TEST_F(EditsResetTest, WaitsForARobotThatIsRemovedAndRestored) {
   const TemporaryFile log("waits.lcm");
   RunOptions options = fast(1e6);
@@ -305,7 +305,7 @@ TEST_F(EditsResetTest, HostileRequestsGetAnErrorText) {
   }
   EXPECT_EQ(state().state_hash, before.state_hash);
   EXPECT_EQ(info().nrobots, 1);
-  EXPECT_EQ(spawn(good, 5, 5).code, reply_t::OK);  // and it still does what is asked
+  EXPECT_EQ(spawn(good, 5, 5).code, reply_t::OK);  // and it still executes requests
   EXPECT_EQ(step(10).step, 20);
 }
 

@@ -41,8 +41,8 @@ std::string noisy_ray() {
                     "<noise><type>gaussian</type><mean>0</mean><stddev>0.05</stddev></noise>");
 }
 
-// As ROS 2 and Foxglove: they hear records, and the run was made when nobody recorded it, so that
-// it has no header of a log.
+// As ROS 2 and Foxglove: they get records, but the run was made without a recorder, so that it has
+// no header of a log.
 class Onlooker : public Sink {
  public:
   Hears hears() const override { return {.samples = false, .records = true}; }
@@ -361,7 +361,7 @@ TEST(Edits, OthersHaveTheSameBytesWithAndWithoutAGuest) {
   }
 }
 
-// Regression: it had the errors of the encoders of who was in its place before.
+// Regression: it had the encoder errors of the robot that was in its place before.
 TEST(Edits, ARobotInThePlaceOfAnotherHasItsOwnFaults) {
   const std::string robot = as_file(robot_sdf("robot", 0, 0));
   const auto run = [&](bool faulty) {

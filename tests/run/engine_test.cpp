@@ -223,7 +223,7 @@ TEST(Engine, ArraysFollowTheRuns) {
   EXPECT_EQ(position.type, Primitive::float64);
   EXPECT_EQ(position.shape, (std::vector<int64_t>{2, 2, 3}));
   const double none = std::nan("");
-  const double velocities[] = {0.3, 0, 0, none, none, none,  // copy 0: a drives, b is told nothing
+  const double velocities[] = {0.3, 0, 0, none, none, none,  // copy 0: a drives, b gets no command
                                0,   0, 0, -0.2, 0,    0};
   engine.drive(velocities);
   engine.step(200);
@@ -327,8 +327,8 @@ TEST(Engine, AHandlerThatThrowsLeavesWorldsSound) {
   EXPECT_EQ(hashes(engine), hashes(fresh));
 }
 
-// Wherever memory runs out, a copy is as it was, has done what was asked, or says that it failed;
-// and after a reset it is a fresh one.
+// Wherever memory runs out, a copy is unchanged, has executed the call, or reports its failure; and
+// after a reset it is a fresh one.
 TEST(Engine, SurvivesEveryFailingAllocation) {
   std::mt19937 random(5);
   engine::EngineOptions options;

@@ -1,5 +1,5 @@
-// What faults cost: what they keep is bounded, and forgotten with them, and those that have ended
-// make room for others.
+// The cost of faults: kept messages are limited and dropped with them, and ended faults make room
+// for others.
 #include "engine/faults/faults.h"
 
 #include <algorithm>
@@ -246,7 +246,7 @@ TEST_F(FaultsTest, LimitsSimultaneousFaults) {
   EXPECT_EQ(faults_.check(weak, RobotIndex(0)), "there are 1000 faults already");
 }
 
-// Whatever number a message of the bus has where: it is taken or ignored, and the run goes on.
+// Whatever numbers a message of the bus has: it is accepted or ignored, and the run continues.
 TEST_F(FaultsTest, NoNumberOfAMessageEndsTheRun) {
   const double odd[] = {1e300, -1e300, 1e15, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL, 5e-324};
   double world::Fault::* const fields[] = {

@@ -24,7 +24,7 @@ class Features : public testing::Test, protected Controlled {
     EXPECT_TRUE(features >> request_t::QUIT & 1);
     for (int32_t kind = 0; kind < 63; ++kind) {
       if (kind == request_t::JOIN || kind == request_t::LEAVE || kind == request_t::QUIT)
-        continue;  // they change who asks
+        continue;  // they change the session
       const reply_t reply = ask(kind);
       EXPECT_EQ(reply.code != reply_t::NOT_SUPPORTED, (features >> kind & 1) != 0)
           << "kind " << kind << ": " << reply.text;

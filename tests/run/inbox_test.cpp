@@ -149,7 +149,7 @@ TEST_F(InboxTest, ARepeatedPrimitiveRunsOnce) {
   moved(7, 1.0);  // the network has exchanged the two
   EXPECT_EQ(applied(3), 0);
   moved(0, 1.0);
-  moved(0, 1.0);  // without a number each is meant
+  moved(0, 1.0);  // without a number each one counts
   EXPECT_EQ(applied(4), 2);
   EXPECT_EQ(inbox.refused(), 0u);
 }

@@ -31,8 +31,8 @@ class LockstepClient {
         messages;  // of the manifest, in its order
   };
 
-  // channels: the server's, whose indices are those of a manifest. over: where there is one, who
-  // waits does so until the run is over, and throws then.
+  // channels: the server's, whose indices are those of a manifest. over: if given,
+  // a waiting call lasts until the run is over, and throws then.
   LockstepClient(LossyBus& bus, const engine::Channels& channels, std::string name,
                  const std::atomic<bool>* over = nullptr)
       : bus_(bus),
@@ -154,7 +154,7 @@ class LockstepClient {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kAgain{
-      4};  // until what was not answered is said again
+      4};  // until an unanswered request is repeated
   static constexpr std::chrono::seconds kPatience{120};  // with a call
 
   struct Step {

@@ -69,8 +69,8 @@ class LockstepTest : public testing::Test {
     return {bus_, server_->channels(), name, &over_};
   }
 
-  // A client's thread that is held up for longer than its lease loses it before the test means it
-  // to, and throws. Where all of the machine was, all begins anew, with a longer one.
+  // A client's thread that does not run for longer than its lease loses it before the test intends
+  // it, and throws. If all of the machine stood still, the test restarts with a longer one.
   void with_leases(int clients, Policy policy, double lease_s,
                    const std::function<void(double)>& test) {
     for (;; lease_s *= 4.0) {
@@ -95,7 +95,7 @@ class LockstepTest : public testing::Test {
               client.step(steps);
             } catch (const std::runtime_error& error) {
               wrong_ = error.what();
-              test_.over_ = true;  // nobody waits for these steps
+              test_.over_ = true;  // no client waits for these steps
             }
           }) {}
     ~Stepping() {
@@ -144,8 +144,8 @@ class LockstepTest : public testing::Test {
 TEST_F(LockstepTest, PausesForASilentClientAndContinuesWithIt) {
   with_leases(2, Policy::pause, 0.3, [&](double) {
     TWO_CLIENTS
-    // While the lease lasts nobody else can take its name; after it has ended somebody may, and
-    // begins where it stood.
+    // While the lease lasts no other client can use its name; after its end another one may, and
+    // begins at its step.
     LockstepClient other = client("b");
     other.join();
     for (bool there = false; !there;) {
@@ -163,8 +163,8 @@ TEST_F(LockstepTest, PausesForASilentClientAndContinuesWithIt) {
     stepping.join();
     EXPECT_EQ(a.have(), 10);
     EXPECT_EQ(other.have(), 10);
-    // It gets everything that b has not acknowledged: all, or what came after b asked for a lost
-    // message.
+    // It gets everything that b has not acknowledged: all, or the messages after b requested a lost
+    // one.
     const int64_t first = other.seen().begin()->first;
     EXPECT_LE(first, b.have() + 1);
     EXPECT_EQ(other.seen().size(), static_cast<size_t>(10 - first + 1));
@@ -178,7 +178,7 @@ TEST_F(LockstepTest, DropsASilentClient) {
     stepping.join();  // without b
     EXPECT_EQ(a.have(), 10);
     EXPECT_THROW(b.step(20), std::runtime_error);  // no such session
-    b.take_part();                                 // anew, from where the run stands
+    b.take_part();                                 // again, from the run's current step
     EXPECT_EQ(b.have(), 10);
     Stepping again(*this, a, 2);
     b.step(2);
@@ -187,8 +187,8 @@ TEST_F(LockstepTest, DropsASilentClient) {
   });
 }
 
-// The server is held up while it answers, for longer than the lease: after it heard the client and
-// before it looks at the leases.
+// The server does not run while it answers, for longer than the lease: after it heard the client
+// and before it checks the leases.
 TEST_F(LockstepTest, BlamesNoClientWhileItsProcessIsStopped) {
   with_leases(1, Policy::fail, 1.1, [&](double lease_s) {
     LockstepClient a = client("a");

@@ -30,8 +30,8 @@ class LockstepRestoreTest : public testing::Test {
   }
   ~LockstepRestoreTest() override { fs::remove_all(folder_); }
 
-  // What a client sees that drives to kEnd; from the beginning it is saved on the way, else it
-  // begins with that. batches: that were computed before the client took part.
+  // The messages of a client that drives to kEnd; from the beginning it is saved on the way, else
+  // it begins with that. batches: that were computed before the client took part.
   std::map<int64_t, LockstepClient::Seen> drive(bool from_beginning, int& batches) {
     LossyBus bus({}, 1);
     std::atomic<int> computed{0};

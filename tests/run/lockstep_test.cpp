@@ -54,7 +54,7 @@ Result run(int clients, Faults faults, unsigned seed) {
   std::vector<std::thread> threads;
   for (int i = 0; i < clients; ++i) {
     threads.emplace_back([&, i] {
-      // The last name comes first: the order of commands is by name, not by who is first.
+      // The last name comes first: the order of commands is by name, not by arrival.
       const std::string name(1, static_cast<char>('z' - i));
       LockstepClient client(bus, server.channels(), name);
       client.take_part();

@@ -103,7 +103,7 @@ class LossyBus : public Bus {
 
   void send(const std::string& channel, const std::vector<uint8_t>& bytes) {
     std::lock_guard lock(sending_);
-    if (!handler_) return;  // nobody listens yet: lost
+    if (!handler_) return;  // without a listener: lost
     to_server_.pass({channel, bytes}, [&](const Message& arrived) {
       handler_(arrived.channel, arrived.bytes.data(), arrived.bytes.size());
     });
@@ -113,7 +113,7 @@ class LossyBus : public Bus {
     std::lock_guard lock(sending_);
     handler_ = nullptr;
   }
-  // The next reply is held up, and the server with it.
+  // The next reply is delayed, and the server with it.
   void hold_next(std::chrono::milliseconds time) { hold_ = time; }
   size_t lost_to_server() {
     std::lock_guard lock(sending_);

@@ -1,5 +1,5 @@
-// What clients draw is checked before it is accepted, displaces no robot's command, and is in the
-// batch for the log.
+// Drawings of clients are checked before they are accepted, displace no robot's command, and are
+// in the batch for the log.
 #include "engine/markers.h"
 
 #include <functional>

@@ -253,7 +253,7 @@ TEST_F(LockstepModeTest, AJoiningClientStartsAtTheGrantedStep) {
   EXPECT_EQ(stands.granted, 100);
   EXPECT_EQ(stands.received, 100);
   EXPECT_EQ(stands.step, 0);
-  // What it was told it may repeat, though state 1 is not there yet; no more.
+  // It may repeat the reply's numbers, though state 1 is missing; no more.
   EXPECT_EQ(having(1, 100).code, reply_t::OK);
   EXPECT_EQ(having(1, 101).code, reply_t::BAD_REQUEST);
   EXPECT_EQ(grant(1, 100, 101, 101).code, reply_t::BAD_REQUEST);
@@ -329,7 +329,7 @@ TEST_F(LockstepModeTest, CommandsAheadGoWithTheirRobot) {
   EXPECT_THAT(world_.apply(600), testing::IsEmpty());
 }
 
-// What the inbox would not take refuses the grant.
+// A command that the inbox refuses makes the grant fail.
 TEST_F(LockstepModeTest, BadValuesRefuseTheGrant) {
   begin(1);
   join_all();

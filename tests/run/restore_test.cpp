@@ -126,7 +126,7 @@ class RestoreTest : public testing::Test, protected Controlled {
     EXPECT_EQ(info().epoch, reply.epoch);
     return batches_ > before + 5;  // the end of one run and the beginning of the next are some, too
   }
-  // What the next steps send, and a command on the way; without the epoch.
+  // The messages of the next steps, with a command on the way; without the epoch.
   std::vector<std::pair<std::string, std::vector<uint8_t>>> go_on(int64_t steps = 300) {
     const size_t from = bus.messages().size();
     step(steps);
@@ -158,7 +158,7 @@ class RestoreTest : public testing::Test, protected Controlled {
     EXPECT_GT(sent.size(), 300u);
     return sent;
   }
-  // Makes the file a stranger's, of a run that ended at that step.
+  // Makes the file another user's, of a run that ended at that step.
   void lead_to(const std::string& name, int64_t step) const {
     std::vector<log::Event> events;
     {
@@ -258,7 +258,7 @@ TEST_F(RestoreTest, RefusesALinkToItself) {
   EXPECT_EQ(step(1).step, 11) << "the run goes on";
 }
 
-// Sealed, a state is nobody else's; without its seal it is not read.
+// A sealed state is the user's own; without its seal it is not read.
 TEST_F(RestoreTest, AFileWithAByteChangedLeadsThereOrIsRefused) {
   start_paused();
   step(100);

@@ -72,7 +72,7 @@ class MemoryBus : public Bus {
   }
 
   // The first message at or after index `from` on a channel that `good` accepts; waits for it.
-  // Throws where none comes, rather than to hold up all tests by this one's time limit.
+  // Throws if none comes, instead of waiting for the test's time limit.
   Message wait_for(const std::string& channel, size_t& from,
                    const std::function<bool(const Message&)>& good = {}) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -91,7 +91,7 @@ class MemoryBus : public Bus {
     std::lock_guard lock(mutex_);
     return messages_;
   }
-  void forget() {  // what was published so far
+  void forget() {  // the published messages
     std::lock_guard lock(mutex_);
     messages_.clear();
   }

@@ -1,4 +1,4 @@
-// What SDF 1.12 has in a <sensor>: the devices read that when a world is made.
+// The elements of SDF 1.12 in a <sensor>: the devices read them when a world is made.
 #include <gtest/gtest.h>
 
 #include "engine/world.h"

@@ -1,4 +1,4 @@
-// Sinks beside the bus: what they receive, and that a slow one delays nobody.
+// Sinks beside the bus: their messages, and that a slow one delays no other.
 #include <atomic>
 #include <condition_variable>
 #include <mutex>

@@ -133,7 +133,7 @@ TEST(SpawnWorker, ALeavingClientGetsNoModel) {
   client.join();
   const request_t another = spawning("another");
   client.send(another);
-  client.state();  // what was sent before is taken in
+  client.state();  // earlier requests have arrived
   gate.open.set_value();
   ASSERT_EQ(client.answer(another).code, reply_t::OK);
   EXPECT_EQ(made, 2);

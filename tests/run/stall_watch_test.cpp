@@ -37,7 +37,7 @@ TEST(StallWatch, ReportsOnceWhatTheRunWaitsFor) {
     idle(1, "too early");
     idle(2, "it waits for 'a'");
     idle(3, "it was told");
-    watch.moved(kStart + seconds(4));  // it takes some seconds each time, and is told of once
+    watch.moved(kStart + seconds(4));  // it takes some seconds each time, and is reported once
     idle(8, "it waits for 'a'");
     watch.moved(kStart + seconds(9));
     idle(12, "it waits for 'b'");
@@ -51,7 +51,7 @@ TEST(StallWatch, ReportsOnceWhatTheRunWaitsFor) {
 // Records what is reported, and waits for a report.
 class Told {
  public:
-  // slow: what a slow machine may be told of first.
+  // slow: the report that a slow machine may give first.
   explicit Told(std::string slow = "this process did not run") : slow_(std::move(slow)) {}
   // Whether it is about the run: before that, a loaded machine may have held this process up.
   bool tell(const std::string& reason) {
@@ -85,7 +85,7 @@ TEST(StallWatch, ReportsTheRequestThatDelaysThePublisher) {
   EXPECT_EQ(told.wait(), "a request is being executed: RESTORE of 'planner'");
 }
 
-// Standard error may be a pipe that nobody reads.
+// Standard error may be a pipe without a reader.
 TEST(StallWatch, ARunContinuesIfNobodyReadsItsWarnings) {
   std::counting_semaphore begun(0), taken(0);
   StallWatch watch({.tell =

@@ -341,7 +341,7 @@ TEST_F(ControlTest, RepeatsTheLastMessageOnALossyBus) {
   EXPECT_EQ(last_words().size(), 3u);
 }
 
-// What comes faster than it is served.
+// Requests that come faster than they are served.
 TEST(Control, FewRequestsWait) {
   size_t executed = 0;
   std::vector<reply_t> replies;

@@ -42,7 +42,7 @@ TEST(Schedule, StepThenModuleThenRobot) {
   const auto names_at = [&](int64_t us) {
     Names names;
     for (const std::string& name : at[us]) {
-      // Nor the run's last word, which tells clients that it has ended.
+      // Nor the run's last message, which reports its end to clients.
       if (name.find("/motion") == std::string::npos && name.find("/joints") == std::string::npos &&
           name != kReplyChannel)
         names.push_back(name);

@@ -1,4 +1,4 @@
-// Pictures that nobody reads are not drawn, and those that somebody reads are the same as ever.
+// Pictures without a reader are not drawn, and those with a reader are the same as ever.
 #include <algorithm>
 #include <atomic>
 #include <mutex>

@@ -52,7 +52,7 @@ TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
   EXPECT_EQ(world.models[1].name, "e");
   EXPECT_FALSE(world.models[1].removed);
   EXPECT_EQ(world.models[1].X_WM.translation, Vec3(1, 2, 3));
-  EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);  // its place is taken
+  EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);  // its place is occupied
 }
 
 TEST(WorldEditor, SpawnsAtTheRequestedPose) {

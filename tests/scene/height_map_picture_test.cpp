@@ -1,4 +1,4 @@
-// What is drawn of a height map: all of a small one, an even part of a large one.
+// The drawn part of a height map: all of a small one, an even part of a large one.
 #include <gtest/gtest.h>
 
 #include "scene/pictures/render_mesh.h"

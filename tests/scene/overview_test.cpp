@@ -1,4 +1,4 @@
-// What of a world is shown from outside: outliers do not count, the floor is what robots stand on.
+// The view of a world from outside: outliers do not count, the floor is below the robots.
 #include "scene/pictures/overview.h"
 
 #include <string>

@@ -15,7 +15,7 @@
 
 namespace ruedo::test {
 
-// What a sensor published: decoded messages of one type on one channel, in order.
+// The messages of a sensor: decoded, of one type on one channel, in order.
 struct Device {
   const SensorKind* kind = nullptr;
   Rate rate;

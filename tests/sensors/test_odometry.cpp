@@ -251,7 +251,7 @@ TEST(Odometry, CountersWrapAndTheRobotUnwrapsThem) {
   EXPECT_EQ(narrow.last().y, wide.last().y);
   EXPECT_EQ(narrow.last().theta, wide.last().theta);
   EXPECT_EQ(narrow.last().angle, wide.last().angle);
-  // More than half the range in one step is taken for the opposite direction, as on the real robot:
+  // More than half the range in one step counts as the opposite direction, as on the real robot:
   // 200 is -56.
   Drive fast(
       "<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");

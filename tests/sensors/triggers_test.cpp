@@ -16,7 +16,7 @@ using testing::IsEmpty;
 
 constexpr SimTime kStep_us = 5000;
 
-// What a device publishes in steps that the test makes; the first is the initial state.
+// The messages of a device in the test's steps; the first is the initial state.
 template <class Message>
 struct Bench {
   Bench(const std::string& sdf, const std::string& robot, const std::string& name)
@@ -85,7 +85,7 @@ TEST(Touch, PublishesOnceAfterTheTargetsTime) {
   bench.now.contacts = {};
   const auto later = bench.step(true);
   ASSERT_EQ(later.size(), 1u);
-  EXPECT_TRUE(later[0].pressed);  // for who comes later
+  EXPECT_TRUE(later[0].pressed);  // for later subscribers
   EXPECT_EQ(later[0].n, 0);
 }
 

@@ -22,7 +22,7 @@
 namespace ruedo {
 namespace {
 
-// What `action` returns in a child within the sandbox: 0, or an errno.
+// The result of `action` in a child within the sandbox: 0, or an errno.
 int within(const Sandbox& sandbox, const std::function<int()>& action) {
   const pid_t child = fork();
   if (child == 0) {

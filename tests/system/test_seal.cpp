@@ -1,4 +1,4 @@
-// The user's key: who has it knows his own files again, and nobody else's.
+// The user's key: with it a user recognises his own files, and no others.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

@@ -1,4 +1,4 @@
-// Degrees where radians are meant are named, with their line; nothing else is.
+// Degrees in place of radians are reported with their line; other values are not.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -165,7 +165,7 @@ TEST(DriveOption, GivesARobotItsWheels) {
   options.spawns = {{"bot.urdf", "bot", 1, 0, 0}, {"bot.urdf", "other", 3, 0, 0}};
   const auto spawned = load_world(empty, options);
   expect_drive(spawned->models[1]);
-  ASSERT_TRUE(spawned->models[2].model->drive);  // which nobody gave one: its wheels are found
+  ASSERT_TRUE(spawned->models[2].model->drive);  // not in the file: its wheels are found
   EXPECT_TRUE(spawned->models[2].model->drive->guessed);
   EXPECT_EQ(spawned->findings.size(), 1u);
   const auto included = load_world(

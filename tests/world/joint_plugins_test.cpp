@@ -116,7 +116,7 @@ TEST(JointPlugins, ReportsJointsThatAnythingElseMoves) {
   EXPECT_THAT(of("two", plugin("JointStatePublisher", "<joint_name>two</joint_name>")), IsEmpty());
 }
 
-// Only a limit may be infinite, and only on the side where it is none.
+// Only a limit may be infinite, and only on the side where that means unlimited.
 TEST(JointPlugins, GainsAreFinite) {
   const auto with = [](const std::string& element) {
     return world_of(

@@ -48,7 +48,7 @@ TEST(Map, WorldCutByHand) {
            shape("wall", "1 0.25 0.5 0 0 0",
                  "<box><size>2 0.5 1</size></box>") +  // x 0 to 2, y 0 to 0.5
            shape("crate", "1.75 0.75 0.2 0 0 0", "<box><size>0.5 0.5 0.4</size></box>",
-                 "") +  // moves, but is no robot
+                 "") +  // moves, but is not a robot
            shape("low", "0.25 1.25 0.05 0 0 0", "<box><size>0.5 0.5 0.1</size></box>") +
            shape("roof", "1 1 3 0 0 0", "<box><size>20 20 0.1</size></box>"));
   const OccupancyGrid grid = occupancy_of(*world, 0.5, 0.3);
@@ -196,7 +196,7 @@ TEST(Map, ArMap) {
   EXPECT_DOUBLE_EQ(points[0].length, 0.02);
 }
 
-// What reading a map throws; nothing: it is good.
+// The error of reading a map; nothing if it is valid.
 std::optional<InputError> error_of(const std::string& path) {
   std::string left_out;
   Findings findings;
@@ -255,7 +255,7 @@ TEST(Map, ReportsMalformedFiles) {
             "a.yaml:5: free_thresh: '0.9' is not allowed; allowed is up to occupied_thresh, 0.1");
 }
 
-// What `ruedo check` would refuse in the world is refused in the map.
+// Errors that `ruedo check` would refuse in the world are refused in the map.
 TEST(Map, WallsAreAsFarAndAsManyAsAWorldTakes) {
   TemporaryFolder folder;
   folder.write("m.pgm", std::string("P5\n1001 1\n255\n") + std::string(1001, '\0'));
@@ -288,7 +288,7 @@ TEST(Map, WallsAreAsFarAndAsManyAsAWorldTakes) {
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n0 0 1 1\nDATA\n" + points), "");  // left out
 }
 
-// A map may be a stranger's: its picture lies in its folder or below.
+// A map may be untrusted: its picture must be in its folder or below.
 TEST(Map, ReachesItsOwnFolder) {
   TemporaryFolder folder;
   const std::filesystem::path inside = std::filesystem::path(folder.path()) / "maps" / "pictures";

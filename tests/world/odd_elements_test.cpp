@@ -126,7 +126,7 @@ TEST(OddElements, APlaneOfThreeNumbers) {
               ElementsAre("<size> of a plane has two numbers; the third is left out"));
 }
 
-// A frame gives way to another thing of the same name, wherever that is.
+// A frame is dropped for another thing of the same name, wherever that is.
 TEST(OddElements, AFrameNamedLikeSomethingElse) {
   const auto world = world_of("<frame name='box'/>" + std::string(kBox));
   ASSERT_EQ(world->models.size(), 1u);
@@ -260,7 +260,7 @@ TEST(OddElements, ReportsDuplicateElements) {
                     "</ruedo:count><ruedo:goal>0 0</ruedo:goal><ruedo:goal>1 1</ruedo:goal>"
                     "<ruedo:count>2</ruedo:count></ruedo:crowd>"),
               ElementsAre(left_out("ruedo:count", "ruedo:crowd")));
-  // What may stand several times, and what a plugin's sensor may have
+  // Elements that may occur several times, and those of a plugin's sensor
   EXPECT_THAT(named("<model name='m'><link name='l'><sensor name='s' type='thermometer'><zone/>"
                     "<zone/></sensor></link><link name='k'/><frame name='f'/><frame name='g'/>"
                     "</model>"),

@@ -1,4 +1,4 @@
-// Values that can be read, and cannot mean what they say: they are named, and the world stands.
+// Values that are readable but impossible: they are reported, and the world is loaded.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

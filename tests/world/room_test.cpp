@@ -36,7 +36,7 @@ TEST_F(Rooms, OfSomethingHugeIsFoundAtOnce) {
   EXPECT_DOUBLE_EQ(standing_on(*world, huge, 0, 0, 0).translation.z(), 0.5);
 }
 
-// A storey above the ground: which of both is meant, a height near it says.
+// A storey above the ground: a height near one of them selects it.
 TEST_F(Rooms, StandOnTheRequestedStorey) {
   const auto fixed = [](const std::string& name, double top) {
     return "<model name='" + name + "'><static>true</static><pose>0 0 " +

@@ -661,7 +661,7 @@ TEST(Guess, AnAxleHasTwoWheels) {
   EXPECT_EQ(drive_of(*world).right_joints.size(), 2u);
 }
 
-// Powered casters drive in all directions. A round link that hangs in the air is no wheel.
+// Powered casters drive in all directions. A round link that hangs in the air is not a wheel.
 TEST(Guess, PoweredCastersAndArms) {
   const std::string arm =
       "<link name='upper'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' "

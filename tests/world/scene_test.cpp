@@ -1,4 +1,4 @@
-// What a world looks like and where things are in it: lights, materials, terrain, saved states,
+// The look of a world and the places of things in it: lights, materials, terrain, saved states,
 // actors.
 #include <cmath>
 
@@ -205,8 +205,8 @@ TEST(Scene, ActorsWalkAsCylinders) {
               testing::ElementsAre(testing::HasSubstr("a cylinder of 1.7 m (and 2 more do)")));
 }
 
-// One trajectory after another, each with a clock of its own; feet on the floor of each storey,
-// and where there is none as high as the file says.
+// One trajectory after another, each with a clock of its own; feet on the floor of each storey, and
+// without a floor at the file's height.
 TEST(Scene, ActorsWalkAllTheirTrajectoriesOnAnyFloor) {
   const auto waypoint = [](const std::string& time, const std::string& at) {
     return "<waypoint><time>" + time + "</time><pose>" + at + "</pose></waypoint>";

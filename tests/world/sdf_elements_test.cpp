@@ -1,4 +1,4 @@
-// What SDF 1.12 has outside of its sensors.
+// The elements of SDF 1.12 outside of its sensors.
 #include "sdf_elements.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What the text of a SPAWN request may reach: the world's folder and the models' folders, and
+// The files that the text of a SPAWN request may reach: the world's and the models' folders, and
 // nothing else, explicitly or not.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -185,7 +185,7 @@ TEST(Strangers, TextsHaveNoFolder) {
   EXPECT_EQ(loaded.findings[0].source.str(), "the text:2");
 }
 
-// What a world's robots find beside them without a name, a SPAWN's find in the world's folder only.
+// A world's robots find unnamed files beside them, a SPAWN's in the world's folder only.
 TEST(Strangers, HaveNoControllersFromElsewhere) {
   const TemporaryFolder folder;
   const std::string gains =

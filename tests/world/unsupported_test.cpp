@@ -1,5 +1,5 @@
-// What Ruedo does not simulate, as files write it: each element is reported, and the rest of the
-// world is loaded.
+// Elements that Ruedo does not simulate: each one is reported, and the rest of the world is
+// loaded.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

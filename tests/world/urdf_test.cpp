@@ -215,7 +215,7 @@ TEST(Robots, AreModelsWhoseJointsTakeCommands) {
   EXPECT_FALSE(is_robot(hinged + "<plugin name='p' filename='gz-sim-wind-effects-system'/>"));
 }
 
-// Names that no channel can have are no reason to refuse a file that runs elsewhere.
+// A file that runs elsewhere is not refused for names that no channel can have.
 TEST(Robots, NamesAreMadeFitForChannels) {
   TemporaryFolder folder;
   const std::string eye = "<link name='l'><sensor name='front eye' type='imu'/></link>";
@@ -432,7 +432,7 @@ TEST(Urdf, GazeboBlocksAct) {
   EXPECT_EQ(a.visuals.at(0).material->diffuse, (Rgba{1, 0, 0, 1}));
 }
 
-// The user's own folder is no package, whatever a file calls it.
+// The user's own folder is not a package, whatever a file calls it.
 TEST(Urdf, DoesNotSearchTheHomeFolderForPackages) {
   TemporaryFolder folder;
   folder.write("ann/pictures/a.obj", kTetrahedron);

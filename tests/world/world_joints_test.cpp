@@ -51,7 +51,7 @@ TEST(WorldJoints, ARobotKeepsItsName) {
   EXPECT_EQ(world->models[0].model->sensors.at(0).name, "imu");
 }
 
-// The world itself may be the parent; a name that is no link of a model is reported.
+// The world itself may be the parent; a name that is not a link of a model is reported.
 TEST(WorldJoints, ToTheWorldAndToNothing) {
   const auto world = world_of(
       kGate +

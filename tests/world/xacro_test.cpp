@@ -77,7 +77,7 @@ TEST(Xacro, IsKnownByItsElementsToo) {
   EXPECT_EQ(world->models.at(0).model->links.size(), 2u);
 }
 
-// What an installed ROS has in its packages does not hide those of the next folder.
+// Packages of an installed ROS do not hide those of the next folder.
 TEST(Xacro, FindsPackagesBehindManyOthers) {
   const TemporaryFolder folder;
   for (int i = 0; i < 300; ++i) {

@@ -1,4 +1,4 @@
-// Who counts an XML text, who changes it and who parses it see the same elements, however it is
+// The code that counts, changes and parses an XML text sees the same elements, however it is
 // written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

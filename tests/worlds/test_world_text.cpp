@@ -181,7 +181,7 @@ TEST(WorldTextTest, ANameThatASpawnMayHaveReadsBack) {
   }
 }
 
-// What stands in a declaration or a comment is no model, whatever it looks like.
+// Text in a declaration or a comment is not a model, whatever it looks like.
 TEST(WorldTextTest, IgnoresModelsInCommentsAndDeclarations) {
   for (const std::string before : {"<?xml version='1.0' x='><sdf><model name=\"i\"/></sdf>' ?>",
                                    "<!--><sdf><model name='i'/></sdf><!-- -->"}) {

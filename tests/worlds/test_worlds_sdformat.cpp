@@ -26,7 +26,7 @@ std::string find_model(const std::string& uri) {
 class Libsdformat : public testing::TestWithParam<std::string> {};
 
 TEST_P(Libsdformat, LoadsOurFileCleanly) {
-  std::ostringstream console;  // unknown elements are said there only
+  std::ostringstream console;  // unknown elements are reported there only
   sdf::Console::Instance()->GetMsgStream().SetStream(&console);
   sdf::ParserConfig config;
   config.SetFindCallback(find_model);

@@ -25,7 +25,7 @@ Bytes joined(std::initializer_list<Bytes> parts) {
 const Bytes kHeader{'R', 'T', 'P', 'S', 2,   1,   1,   16,  100, 101,
                     102, 103, 104, 105, 106, 107, 108, 109, 110, 111};
 const Bytes kTime{9, 1, 8, 0, 1, 2, 3, 4, 5, 6, 7, 8};  // INFO_TS
-// To nobody's reader, from the writer 0 0 21 3, number 5; behind it inline QoS and payload.
+// To no particular reader, from the writer 0 0 21 3, number 5; behind it inline QoS and payload.
 Bytes data(uint8_t flags, const Bytes& rest) {
   const auto size = static_cast<uint8_t>(20 + rest.size());
   return joined(
@@ -93,8 +93,8 @@ TEST(Identity, OfARequestIsItsWritersNumberOrTheReaderThatWaits) {
   }
 }
 
-// What several participants of a process tell at once, as Cyclone leaves it: sizes are turned, the
-// prefix in an INFO_SRC is not.
+// Announcements of several participants of a process in one message, as Cyclone leaves it: sizes
+// are swapped, the prefix in an INFO_SRC is not.
 TEST(Identity, OfARequestInASharedMessageIsItsOwnParticipants) {
   const Bytes source{0x0c, 1,   20,  0,   0,   0,   0,   0,   2,   1,   1,   15,
                      200,  201, 202, 203, 204, 205, 206, 207, 208, 209, 210, 211};

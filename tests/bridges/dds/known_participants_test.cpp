@@ -174,12 +174,12 @@ TEST_F(KnownParticipantsTest, RejectsAnnouncementsOfOtherParticipants) {
   EXPECT_FALSE(passes(from(own, {leaving(other)})));
   EXPECT_FALSE(passes(from(own, {endpoint(other, 0x0103)})));
   EXPECT_TRUE(passes(from(own, {endpoint(own, 0x0103)})));
-  // A vendor of those who do, by the message's head and within it.
+  // A vendor that announces others, by the message's head and within it.
   EXPECT_FALSE(passes(from(own, {endpoint(own, 0x0103)}, 0x20)));
   EXPECT_FALSE(last_passes(from(own, {source(own, 0x20), endpoint(own, 0x0103)})));
 }
 
-// As Cyclone DDS sends what several participants of a process tell at once.
+// As Cyclone DDS sends announcements of several participants of a process at once.
 TEST_F(KnownParticipantsTest, ParticipantsShareAMessage) {
   const Prefix first = prefix(1), second = prefix(2);
   for (const bool little : {true, false}) {
@@ -191,7 +191,7 @@ TEST_F(KnownParticipantsTest, ParticipantsShareAMessage) {
   EXPECT_TRUE(last_passes(from(first, {source(second), endpoint(second, 0x0103)})));
   EXPECT_FALSE(last_passes(from(first, {source(second), endpoint(first, 0x0203)})));
   EXPECT_TRUE(last_passes(from(second, {source(first), endpoint(first, 0x0203)})));
-  // One that is cut off names nobody.
+  // A truncated one identifies no participant.
   EXPECT_TRUE(last_passes(from(first, {submessage(0x0c, 0, Bytes(19)), endpoint(first, 0x0303)})));
 }
 
@@ -245,7 +245,7 @@ TEST_F(KnownParticipantsTest, DropsTheParticipantWithTheMostEndpoints) {
         passes(from(prefix(who), {endpoint(prefix(who), entity, 12'000, topic, ++sequence)})));
   };
   for (int i = 0; i < 1000; ++i) tell(2);
-  // One that is told of again, or that comes and goes, takes no room.
+  // One that is announced again, or that comes and leaves, needs no room.
   for (int i = 0; i < 12'000; ++i) {
     EXPECT_TRUE(passes(from(prefix(2), {endpoint(prefix(2), 0, 12'000, 'a', ++sequence)})));
     if (i % 2 == 1) {
@@ -273,7 +273,7 @@ TEST_F(KnownParticipantsTest, OneSocketHasItsShareOfATopic) {
   EXPECT_TRUE(tells(1, 0, 'a'));  // is known already
   EXPECT_TRUE(tells(1, 0, 'c'));  // stays where it was
   EXPECT_FALSE(tells(1, 1000, 'a'));
-  EXPECT_TRUE(passes(from(prefix(1), {goes(prefix(1), 0, 1)})));  // was told before: means nothing
+  EXPECT_TRUE(passes(from(prefix(1), {goes(prefix(1), 0, 1)})));  // an old sequence number: ignored
   EXPECT_FALSE(tells(1, 1000, 'a'));
   EXPECT_TRUE(passes(from(prefix(1), {goes(prefix(1), 0, 1000)})));
   EXPECT_TRUE(tells(1, 1000, 'a'));

@@ -69,7 +69,7 @@ TEST(FairQueue, CrowdsAreAnsweredMoreSlowly) {
   EXPECT_THAT(all_that_may(queue, kStart, kAnybody), ElementsAre(0, 0, 1, -1, -2));
   EXPECT_THAT(all_that_may(queue, kStart + milliseconds(10), kAnybody), ElementsAre(2));
   EXPECT_THAT(all_that_may(queue, kStart + milliseconds(30), kAnybody), ElementsAre(3, 4));
-  // What is left is no crowd any more.
+  // The rest is within the limit.
   for (int ms = 50; ms <= 150; ms += 20) all_that_may(queue, kStart + milliseconds(ms), kAnybody);
   EXPECT_TRUE(queue.empty());
 }

@@ -136,7 +136,7 @@ TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
   EXPECT_EQ(one.topic("p3at", "odom"), "/odom");
   EXPECT_EQ(one.topic("p3at", "scan"), "/front/scan");
   EXPECT_EQ(one.frame("p3at", "base_link"), "base_link");
-  EXPECT_EQ(one.topic("bob", "odom"), "/bob/odom");  // who comes later
+  EXPECT_EQ(one.topic("bob", "odom"), "/bob/odom");  // added later
   EXPECT_EQ(one.frame("bob", "base_link"), "bob/base_link");
   EXPECT_EQ(many.topic("alice", "scan"), "/alice/scan");
   EXPECT_EQ(many.topic("", "clock"), "/clock");
@@ -167,7 +167,7 @@ TEST(Names, OfTwoRobotsAlwaysDiffer) {
   EXPECT_EQ(names.topic("a-b", "scan"), "/a_b_2/scan");
   EXPECT_EQ(names.frame("a.b", "base_link"), "a_b_3/base_link");
   names.update({"a-b", "a.b", "a_b_2"});
-  EXPECT_EQ(names.topic("a-b", "scan"), "/a_b_2/scan");  // whoever comes or goes
+  EXPECT_EQ(names.topic("a-b", "scan"), "/a_b_2/scan");  // whichever robot is added or removed
   EXPECT_EQ(names.topic("a_b_2", "scan"), "/a_b_2_2/scan");
   names.update({});
   names.update({"a-b"});

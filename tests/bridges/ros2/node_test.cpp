@@ -19,7 +19,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-// What the test and the transport share.
+// The state that the test and the transport share.
 struct Middleware {
   std::map<std::string, size_t> readers;                    // of a topic, elsewhere
   std::map<std::string, std::vector<std::string>> written;  // by topic
@@ -259,7 +259,7 @@ TEST(Node, ForgetsRemovedRobots) {
 
 using FramesByTopic = std::map<std::string, std::set<std::string>>;  // "PARENT CHILD"
 
-// What a robot p3at with a namespace publishes of tf, and the frame of its scan.
+// The tf messages of a robot p3at with a namespace, and the frame of its scan.
 FramesByTopic tf_frames(TfLayout layout, std::string& of_scan) {
   const auto shared = std::make_shared<Middleware>();
   world_info_t info = robot_with_a_camera();

@@ -15,7 +15,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-// A run that answers when the test tells it to.
+// A run that answers on the test's command.
 struct FakeRun {
   std::vector<request_t> got;
   std::vector<int32_t> answers;  // their codes
@@ -90,7 +90,7 @@ TEST(Requests, StepsThatTakeForEverLeaveRoom) {
 
 TEST(Requests, RepeatsUnansweredRequests) {
   FakeRun run;
-  // However long this thread is held up between its calls.
+  // However long this thread does not run between its calls.
   const auto before = Requests::Clock::now();
   const auto repeat_later = [&run] {
     run.requests.repeat(Requests::Clock::now() + 2 * Requests::kRepeat);

@@ -27,7 +27,7 @@ void hammer(Bus& bus, int number, int count, std::chrono::steady_clock::time_poi
     if (now % 7 == 0)
       bus.subscribe("hammer/within" + std::to_string(number), [](const uint8_t*, size_t) {})
           .close();
-    if (now % 50 == 1) throw 42;  // what a callback throws hurts nobody
+    if (now % 50 == 1) throw 42;  // an exception of a callback is harmless
   };
   for (int done = 0; done < count || std::chrono::steady_clock::now() < end; ++done) {
     const Subscription own = bus.subscribe(name + std::to_string(done % kChannels), hear);

@@ -1,4 +1,4 @@
-// What textbook programs use of the client, in C++; api.py and Api.java are its twins, with the
+// The client's API for textbook programs, in C++; api.py and Api.java are its twins, with the
 // same commands and output.
 #include <algorithm>
 #include <atomic>
@@ -258,7 +258,7 @@ void driving(const rc::Simulation& sim) {
   double fastest = 0.0;
   while (fastest == 0.0 || robot.motion().latest(kPatience).v > 0.0)
     fastest = std::max(fastest, robot.motion().next(kPatience).v);
-  say("published", fastest);  // it lapsed: nobody repeats it
+  say("published", fastest);  // it lapsed: nothing repeats it
 }
 
 void saves(const rc::Simulation& sim) {

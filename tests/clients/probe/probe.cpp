@@ -167,7 +167,7 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
   robot.stop().wait(kPatience);
   const auto run = [&](const char* what, const std::function<rc::Motion()>& start) {
     const auto begin = robot.pose().next(kPatience);
-    sim.pause();  // else it may be over, for who looks late
+    sim.pause();  // else it may be over for a late client
     const rc::Motion motion = start();
     const bool early = motion.done();
     sim.resume();
@@ -182,13 +182,13 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
   run("turn_to", [&] { return robot.turn_to(0.0); });
   run("arc", [&] { return robot.arc(0.8, 0.5); });
   const rc::Motion replaced =
-      robot.advance(5.0, {.speed = 0.05});  // slowly: whoever is late finds it under way
+      robot.advance(5.0, {.speed = 0.05});  // slowly: a late client finds it under way
   sim.sleep(0.5);
   robot.stop().wait(kPatience);
   report("replaced", [&] { replaced.wait(); });
   const rc::Motion running = robot.advance(5.0, {.speed = 0.05});
   report("refused",
-         [&] { robot.advance(2e6).wait(); });  // further than the server allows: what runs goes on
+         [&] { robot.advance(2e6).wait(); });  // further than allowed: the current one continues
   report("too_long", [&] { running.wait(0.3); });
   robot.stop().wait(kPatience);
 }
@@ -514,8 +514,8 @@ void say_age(const rc::Simulation& sim, const Stream& stream) {
   say("age", now - newest - asked.count());
 }
 
-// What a program does in a run that it launched: looks now and then, works in a callback, and acts
-// on what it sees.
+// A program in a run that it launched: it reads now and then, works in a callback, and acts on its
+// samples.
 void keeps_up(const std::string& rate) {
   const auto nap = [](double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); };
   rc::LaunchOptions options;
@@ -625,7 +625,7 @@ void read_log(const std::vector<std::string>& a) {
   report("mismatch", [&] { static_cast<void>(log.samples<rc::Scan>("p3at/pose")); });
 }
 
-// In a callback, while the step that calls it goes on.
+// In a callback, while the step that calls it is under way.
 void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
   const rc::Subscription calls =
       sim.robot(a[1]).odometry().on_sample([&](const rc::Odometry&) { sim.close(); });
@@ -636,7 +636,7 @@ void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
   }
 }
 
-// What another client of this process, or of the same name, has under way is not its own.
+// Primitives of another client of this process, or of the same name, are not its own.
 void apart(const std::string& url, const std::string& name) {
   for (const std::string own : {"", "driver"}) {
     const std::string what = own.empty() ? "unnamed" : own;

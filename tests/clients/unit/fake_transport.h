@@ -32,7 +32,7 @@
 
 namespace ruedo::client {
 
-// What the test and the client's transport share.
+// The state that the test and the client's transport share.
 class FakeServer {
  public:
   using Bytes = std::vector<uint8_t>;
@@ -106,7 +106,7 @@ class FakeServer {
     send(robot + "/motion", status);
   }
 
-  // How many messages the client has sent on a channel so far.
+  // The number of messages that the client has sent on a channel.
   int64_t heard(const std::string& channel) {
     const std::lock_guard lock(mutex_);
     return heard_[channel];
@@ -115,8 +115,8 @@ class FakeServer {
   void await(const std::function<bool()>& ready) {
     while (!ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  // Returns when the client's handlers have received everything sent so far, and its callbacks have
-  // seen it.
+  // Returns when the client's handlers have received all sent messages, and its callbacks have seen
+  // them.
   void await_delivery() {
     {
       std::unique_lock lock(mutex_);

@@ -26,7 +26,7 @@ constexpr Duration kPatience = 300.0;
 
 class Lifetimes : public testing::Test {
  protected:
-  // The text of the error; "" when there is none.
+  // The text of the error; "" without one.
   static std::string error_of(const std::function<void()>& call) {
     try {
       call();
@@ -200,7 +200,7 @@ TEST_F(Lifetimes, CloseInACallbackRepeatsLeaveUntilItsReply) {
   server->send_odometry("p3at", 1000, 0.0);
   server->await([&] { return server->leaves > 0; });
   sim.close();                   // which waits for the end
-  EXPECT_GE(server->leaves, 3);  // the third is answered; who is late says it again meanwhile
+  EXPECT_GE(server->leaves, 3);  // the third is answered; a late client repeats it meanwhile
   EXPECT_LE(server->leaves, 5);
   EXPECT_EQ(count, 1);
 }
@@ -321,7 +321,7 @@ TEST_F(Lifetimes, TwoSimulationsInAProcessEndInEitherOrder) {
     EXPECT_EQ(error_of([&] { other.next(); }), "this simulation was closed");
     first_server->send_odometry("p3at", 2000, 2.0);
     first_server->await_delivery();
-    EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the first goes on
+    EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the first continues
     (first_ends_first ? first : second).reset();
     (first_ends_first ? second : first).reset();
     EXPECT_EQ(error_of([&] { odometry.next(); }), "this simulation was closed");
@@ -467,7 +467,7 @@ TEST_F(Lifetimes, AForkedChildCannotUseOrEndTheSimulation) {
   EXPECT_EQ(status, 0);
   server->send_odometry("p3at", 2000, 2.0);
   server->await_delivery();
-  EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the parent's goes on
+  EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the parent's continues
 }
 
 TEST_F(Lifetimes, RefusesInvalidArgumentsAtOnce) {
@@ -592,7 +592,7 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   testing::internal::CaptureStderr();
   server->run_id = 8;
   server->await([&] {
-    server->send_tick(1000);  // it asks who that is
+    server->send_tick(1000);  // it requests the other's info
     return events == 1;
   });
   server->await_delivery();
@@ -605,7 +605,7 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   EXPECT_EQ(motion.reason(), MotionReason::new_run);
   EXPECT_THROW((void)odometry.latest(0.01), Timeout);  // what is known is of the run before
   EXPECT_LT(sim.time(), 1.0);
-  sim.pause();  // it joins anew
+  sim.pause();  // it joins again
 }
 
 TEST_F(Lifetimes, MessagesOfAnotherServerEndNothing) {

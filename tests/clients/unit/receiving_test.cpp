@@ -1,5 +1,5 @@
-// What comes while the user's code works: nothing waits for callbacks but they themselves, what was
-// skipped is counted, commands arrive, and the server is told how far the program has come.
+// Receiving while the user's code works: only callbacks wait for callbacks, skipped samples are
+// counted, commands arrive, and the server gets the program's progress.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -131,7 +131,7 @@ TEST_F(Receiving, AReaderCountsSkippedAndLostSamples) {
   server->send_odometry("p3at", 20'000 * 8, 8.0);  // three are missing
   EXPECT_EQ(odometry.next(kPatience).x, 8.0);
   EXPECT_EQ(odometry.dropped(), 5);
-  EXPECT_EQ(sim.robot("p3at").odometry().dropped(), 5);  // who goes on where it was read
+  EXPECT_EQ(sim.robot("p3at").odometry().dropped(), 5);  // it continues where it was read
 }
 
 TEST_F(Receiving, ADamagedMessageIsTheReadersErrorOnce) {
@@ -230,7 +230,7 @@ TEST_F(Receiving, ReportsThreadsThatUseASample) {
   const int64_t begin = used();
   EXPECT_GE(begin, 60'000);
   EXPECT_LT(begin, kNever);
-  server->await([&] { return used() >= begin + 50'000; });  // as real time goes on
+  server->await([&] { return used() >= begin + 50'000; });  // with real time
   EXPECT_THROW(odometry.next(0.001), Timeout);
   EXPECT_EQ(used(), kNever);  // it waits
   (void)odometry.latest();
@@ -254,7 +254,7 @@ TEST_F(Receiving, ReportsThreadsThatUseASample) {
 TEST(Progress, ASecondEpochBeginsAnew) {
   Progress progress;
   std::vector<std::string> lines;
-  progress.use(1000);  // nobody is told yet
+  progress.use(1000);  // not reported yet
   EXPECT_FALSE(progress.in_use());
   progress.begin([&](const std::string& line) { lines.push_back(line); }, 0, 0);
   lines.clear();

@@ -1,4 +1,4 @@
-// What a stranger may have a client keep of ruedo/info.
+// Limits on untrusted parts of ruedo/info that a client keeps.
 #include "samples/world_info.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ using namespace ruedo::client;
 
 namespace {
 
-// How many parts of so many bytes are taken, and why no more.
+// The number of accepted parts of this size, and the reason why no more.
 std::pair<int, std::string> taken(int nparts, size_t size) {
   WorldInfoAssembler assembler;
   world_info_t info{};

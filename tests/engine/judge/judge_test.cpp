@@ -138,7 +138,7 @@ TEST_F(JudgeTest, WithoutAStepNothingIsJudged) {
   judge(expected);
   for (const char* what : {"run", "contact", "clearance", "odometry"})
     EXPECT_EQ(outcome(what), Outcome::not_judged) << what;
-  see(0.0);  // the initial state is no step
+  see(0.0);  // the initial state does not count as a step
   for (const char* what : {"run", "contact", "clearance", "odometry"})
     EXPECT_EQ(outcome(what), Outcome::not_judged) << what;
   EXPECT_FALSE(judge_->verdict().passed());
@@ -495,7 +495,7 @@ TEST_F(JudgeTest, ReportsMetricsOfTheRun) {
   EXPECT_DOUBLE_EQ(metrics().at("contact_time_s"), 0.01);  // of the first one
   EXPECT_DOUBLE_EQ(metrics().at("odometry_error_m"), 1.0);
   EXPECT_FALSE(metrics().contains("clearance_m"));
-  EXPECT_EQ(check("contact").text, "there is no such check");  // nobody asked for it
+  EXPECT_EQ(check("contact").text, "there is no such check");  // it was not expected
 
   Expectations reach;
   reach.clearance_reach = 1.0;

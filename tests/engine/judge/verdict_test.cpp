@@ -1,4 +1,4 @@
-// A verdict, and how it is told.
+// A verdict, and its texts.
 #include "engine/judge/verdict.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What a program of a textbook uses, in C++; api.py and Api.java are its twins.
+// The API for textbook programs, in C++; api.py and Api.java are its twins.
 #include <ruedo/client.h>
 #include <chrono>
 #include <cmath>

@@ -49,7 +49,7 @@ Pose resolved(const SemanticPose& pose, const std::string& to = "") {
   return pose_of(result);
 }
 
-// What libsdformat says, flattened as our reader flattens.
+// The values of libsdformat, flattened as by our reader.
 struct Their {
   struct Link {
     Pose X_WL;
@@ -224,7 +224,7 @@ void compare_instance(const world::ModelInstance& ours, const Their& their,
       EXPECT_NEAR(v.transparency, other->Transparency(), 1e-6) << what;
       ++counts.shapes;
     }
-    // What we left out, we said.
+    // Everything that we left out was reported.
     for (uint64_t i = 0; i < theirs.CollisionCount(); ++i) {
       const std::string name = theirs.CollisionByIndex(i)->Name();
       const bool here = std::any_of(link.collisions.begin(), link.collisions.end(),

@@ -319,7 +319,7 @@ class Client {
       return requests.current_count > 0 && replies.current_count > 0;
     });
     if (!found) return std::nullopt;
-    // A request that is sent before the server knows of its writer goes to nobody, with any DDS.
+    // A request that is sent before the server knows its writer is lost, with any DDS.
     for (int again = 0; again < 10; ++again) {
       if (auto reply = ask(request)) return reply;
     }
