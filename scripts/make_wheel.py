@@ -30,8 +30,8 @@ sys.path.insert(0, str(ROOT / "packaging"))
 import parts  # noqa: E402
 
 PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
-# What Debian's libraries are linked to and nothing here calls, by the library that is: most of them
-# some 10 MB.
+# Libraries that Debian's libraries are linked to and nothing here calls, by the linked one: most
+# of them some 10 MB.
 UNUSED = {
     "libLLVM": ["libz3", "libxml2", "libedit"],
     "libopencv_imgcodecs": ["libgdal", "libgdcm"],
@@ -39,7 +39,7 @@ UNUSED = {
     "libopencv_core": ["libGLX", "liblapack", "libblas"],
     "libtiff": ["libjbig"],  # GPL
 }
-# What the platform's tag takes for granted, and a bare Debian has not.
+# Libraries that the platform's tag presumes, and a bare Debian lacks.
 NOT_THERE = ("libglib-2.0",)
 BYTES_EPOCH = (2020, 1, 1, 0, 0, 0)
 SCRIPT = '''#!python

@@ -452,7 +452,7 @@ def circles(imports):
 
 
 # The packages of the Python client, and which others each may import; "" are the modules outside of
-# all. What builds on the client is never imported by it.
+# all. The client never imports the packages that build on it.
 PYTHON_PACKAGES = {
     "": {"transport", "session"},
     "transport": {""},

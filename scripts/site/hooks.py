@@ -81,7 +81,7 @@ def on_page_markdown(markdown, page, config, files):
             link = rf'<a href="{Path(folder).name}/index.html">(.*?)</a>'
             markdown = re.sub(link, r"\1 (not in this build)", markdown)
     if page.parent is None:
-        page.meta["hide"] = ["navigation"]  # there are no pages beside it
+        page.meta["hide"] = ["navigation"]  # it has no pages beside it
     if name == "contributing.md":  # Python's Markdown indents lists by four columns
         markdown = re.sub(r"^   (?=\S)", "    ", markdown, flags=re.MULTILINE)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 WIDTH = 100
 ITEM = re.compile(r"( *)([-*]|\d+\.) +")
 KEPT = re.compile(r"\s*(\||#|<|:::|!\[|$)|    ")  # of lines outside of lists
-# What would begin a list, a heading or a quotation at the start of a line.
+# Characters that begin a list, a heading or a quotation at the start of a line.
 SIGN = re.compile(r" (?=([-+*#>]|\d+[.)]) )")
 
 

@@ -30,7 +30,7 @@ def walls(distance):
     return World("walls").wall(distance, -2, distance, 2).robot("p3at")
 '''
 
-# HOLD names a file: while there is one, bold cases wait, for who wants to meet the campaign half
+# HOLD is a file: while it exists, bold cases wait, so that a test meets the campaign half
 # done. Those are the cases 2, 3, 6 and 7.
 CONTROLLER = '''
 import os

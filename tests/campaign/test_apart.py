@@ -186,7 +186,7 @@ def test_processes_that_a_repeated_program_leaves_are_ended(tmp_path):
     command = "echo $$ > child; exec sleep 1000"
     (tmp_path / "leave.sh").write_text(command)
     command = "setsid sh leave.sh & while ! test -s child; do :; done"
-    limits = "{duration: 1, wall: 10}"  # who is in the background is waited for
+    limits = "{duration: 1, wall: 10}"  # background processes are waited for
     campaign(tmp_path, {"c": f'command: "{command}", lockstep: 1'}, limits=limits)
     ruedo("campaign", "repeat", "c.yaml", "0", folder=tmp_path)
     assert not os.path.exists(f"/proc/{(tmp_path / 'child').read_text().strip()}")
@@ -291,7 +291,7 @@ def test_output_during_a_cut_is_kept(tmp_path, monkeypatch):
     os.write(said.descriptor, b"the end")
     assert said.text().startswith("(it printed more than 1 MB;")
     assert said.text().endswith("xmeanwhile, the end") and len(said.text()) < 5000
-    os.truncate(said.descriptor, 0)  # by who prints
+    os.truncate(said.descriptor, 0)  # by the controller
     os.write(said.descriptor, b"y" * (2 << 20))
     wait_for(lambda: blocks_bytes(said.descriptor) < 1 << 20)
     said.close()
@@ -329,7 +329,7 @@ def stubborn(view):
     try:
         while True:
             time.sleep(0.01)
-    except BaseException:  # around the loop: what tells it that its time is up may come anywhere
+    except BaseException:  # around the loop: the signal that its time is up may come anywhere
         stubborn(view)
 """
 

@@ -274,7 +274,7 @@ def test_a_robot_placed_in_an_obstacle_does_not_count_as_a_failure(tmp_path):
     assert found is None
 
 
-BROKEN = {  # and what is said of it
+BROKEN = {  # and the expected error
     "no message": "at 1 s",
     "a far step": "at 1 s",
     "a wrong option": r"bad\.lcm: --set p3at/lrf\.update_rate: .*'\?\[31m' is not a rate",

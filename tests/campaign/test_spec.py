@@ -218,7 +218,7 @@ def test_a_wrong_file_is_reported_with_line_and_allowed_values(folder, old, new,
     assert str(caught.value).startswith(f"{folder / 'c.yaml'}:{line}: ")
 
 
-NAMES = [  # what only a loaded world knows: a line of the file, what is said
+NAMES = [  # faults that only a loaded world shows: a line of the file, the error
     ("set: {p3at/lrf.updaterate: 5}", r"set.p3at/lrf.updaterate: .*p3at/lrf.updaterate"),
     ("set: {p3at/lfr.update_rate: 5}", r"set.p3at/lfr.update_rate: .*lfr"),
     ("set: {p3at/lrf.update_rate: fast}", r"set.p3at/lrf.update_rate: .*fast"),

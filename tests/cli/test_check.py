@@ -64,7 +64,7 @@ def png(width, height):
 
 
 COLLISION = "model m/link l/collision c"
-# What the world says; other files beside it; the exit code; the finding's kind, line and element,
+# The world's text; other files beside it; the exit code; the finding's kind, line and element,
 # and a part of its text.
 FILES = {
     "a sensor that is none": (

@@ -106,7 +106,7 @@ def test_a_urdf_without_a_plugin_gets_a_drive(tmp_path):
     (tmp_path / "cart.urdf").write_text(URDF)
     guessed = json.loads(
         ruedo("check", tmp_path / "cart.urdf", "--json").stdout
-    )  # from the joints' names and places, and it is said
+    )  # from the joints' names and places, with a finding
     assert len(guessed) == 1 and "--drive" in guessed[0]["text"], guessed
     robots = json.loads(
         ruedo("info", tmp_path / "cart.urdf", "--drive", "cart=jl,jr", "--json").stdout

@@ -326,7 +326,7 @@ def test_a_killed_server_is_noticed():
     server = serve(7907)
     with ruedo.connect(url(7907), timeout=PATIENCE) as simulation:
         simulation.sleep(0.1)
-        server.send_signal(signal.SIGSTOP)  # a debugger, say: nobody is gone
+        server.send_signal(signal.SIGSTOP)  # a debugger, say: no client has left
         lrf = simulation.robot("p3at").lrf
         with pytest.raises(ruedo.Timeout):
             while True:  # some are under way

@@ -96,7 +96,7 @@ def test_it_reports_its_progress(name, commands):
     code, said = on_terminal(*words)
     assert code == 0, said
     assert any(re.match(what + r"(: \d+ %|, 0 s)", line) for line in drawn(said)), said
-    # Each line is taken away before what the command itself has to say.
+    # Each line is removed before the command's own output.
     last = said[said.rfind("\r\x1b[K") + 4 :]
     assert not re.match(what, last), said
 

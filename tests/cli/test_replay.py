@@ -410,7 +410,7 @@ def test_a_controller_that_dies_is_reported(bot_core):
     bus.subscribe("ruedo/info", lambda channel, data: signs.append(data))
     until(lambda: bus.handle_timeout(100) and len(signs) >= 3)
     code, errors = server.end(signal.SIGINT)
-    # Each message that is waited for is named once; a controller that was slow is named, too.
+    # Each missing message is reported once; so is a slow controller.
     stalls = [line.strip() for line in said + errors.splitlines() if stall in line]
     assert code == 0 and len(set(stalls)) == len(stalls), stalls
 

@@ -264,7 +264,7 @@ def test_a_page_for_a_fifo_can_be_given_up(log, tmp_path):
         assert process.wait(400) != 0
 
 
-# Files in place of .lcm files, and what is said of them.
+# Files in place of .lcm files, and their errors.
 NO_TYPES = {
     "text": ("hello, world\n", "holds no message type"),
     "fifo": (os.mkfifo, "is not a regular file"),

@@ -254,7 +254,7 @@ def test_killed_in_the_middle(tmp_path):
 def test_a_full_disk(tmp_path):
     log = tmp_path / "full.lcm"
     command = f"ulimit -f 2000; exec {RUEDO} run {ARENA} {' '.join(QUICK)} --rate max --duration 600 --record {log} --lcm '{url(7824)}'"
-    # Python ignores SIGXFSZ; its child does too, and is told by the write that there is no room.
+    # Python ignores SIGXFSZ; its child does too, and the write fails for lack of room.
     result = subprocess.run(
         ["sh", "-c", command],
         capture_output=True,

@@ -27,14 +27,14 @@ def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
             program.kill()
             program.wait()
     most = 0.0501
-    if load and rate == "1":  # a run that was held up goes faster than real time, until it is due
+    if load and rate == "1":  # a delayed run advances faster than real time until it has caught up
         most += CATCH_UP_SECONDS
     assert max(float(age) for age in said.all("age")) < most
     count, gap, dropped = said.numbers("seen")
     assert count >= 19 and gap < 0.1051 and dropped == 0
     assert all(float(turned) < 1e-9 for turned in said.all("after"))
     # 0.17 m until the next scan and to brake, and 0.4 m for each second without a processor: beside
-    # a load, at most the half second for which a run at the highest rate goes on.
+    # a load, at most the half second that a run at the highest rate advances.
     assert (0.42 if load else 0.55) < said.numbers("stands")[0] < 0.72
 
 

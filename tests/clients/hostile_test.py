@@ -298,7 +298,7 @@ def test_a_hundred_thousand_devices(language, stream_url):
     """Of which each is listed, in a time that grows as their number does."""
     many = info([])
     devices, channels = many.devices[:1], many.channels[:1]
-    channels[0].device = "another"  # of the first device there is none
+    channels[0].device = "another"  # the first device has none
     many.devices, many.channels = 100_000 * devices, 100_000 * channels
     many.ndevices = many.nchannels = 100_000
     with LyingStream(stream_url, HELLO + frame("ruedo/info", many.encode())):

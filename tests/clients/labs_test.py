@@ -21,8 +21,8 @@ import umbmark
 import wall_following
 
 
-# The kinematic drive does what it plans. What believes in a track that is 2 % wider turns 360 /
-# 1.02 degrees by its own reckoning.
+# The kinematic drive follows its plan exactly. With a track that it believes to be 2 % wider it
+# turns 360 / 1.02 degrees.
 def test_a_square_ends_where_it_began_and_its_odometry_elsewhere():
     odometry, pose = square.square(track_error=0.02)
     assert math.hypot(pose.x, pose.y) < 1e-6 and abs(pose.heading) < 1e-6

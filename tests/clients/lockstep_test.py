@@ -275,7 +275,7 @@ def test_a_step_that_was_given_up_holds_up_no_other(language):
     """More than a client acknowledges together are under way when the next step is asked for."""
     with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "given_up", "one")
-    # "no": the client was held up (no processor) until the steps were done.
+    # "no": the client did not run (no processor) until the steps were done.
     assert said.one("given_up") in ("Timeout", "no")
     assert said.words("then") == ["2001", "2002"]
 
@@ -321,7 +321,7 @@ def test_waiting_reports_the_missing_client():
             times_out(other, 5, "the run waits for 'first'")
             assert (
                 sim.step(2, timeout=PATIENCE).step == 3
-            )  # goes on after the timeout: the step granted then, and two more
+            )  # continues after the timeout: the step granted then, and two more
             assert sim.step(0).step == 3
 
 
@@ -348,7 +348,7 @@ def test_a_lost_lease():
     """By policy drop; the client takes part anew. And by policy fail, with the exit code."""
     import ruedo
 
-    for lease in (2, 20):  # who is held up for longer loses it once more
+    for lease in (2, 20):  # a client that does not run for longer loses it again
         last = step_after_a_lost_lease(lease)
         if last is not None:
             break

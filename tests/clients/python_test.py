@@ -488,7 +488,7 @@ def test_two_simulations_in_a_process_end_in_either_order(first_ends_first):
         with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
             other.next()
         before = odometry.latest(PATIENCE)
-        assert odometry.next(PATIENCE).utime > before.utime  # the first goes on
+        assert odometry.next(PATIENCE).utime > before.utime  # the first continues
         for sim in (first, second) if first_ends_first else (second, first):
             sim.close()
         for stream in (odometry, other):
@@ -638,7 +638,7 @@ def test_the_child_of_a_fork_is_reported():
             os.read(reader, 1000).decode()
             == "this simulation is the parent process's: connect() again after a fork"
         )
-        assert sim.state().step >= 0  # and the parent's goes on
+        assert sim.state().step >= 0  # and the parent's continues
 
 
 def test_errors_cross_processes_and_simulations_do_not():
@@ -931,7 +931,7 @@ def test_a_closed_simulation_leaves_nothing_running(scheme, tmp_path):
         assert settles_at_most_at(before), (held(), before)
 
 
-# What no message of ours says, but the interpreter or NumPy of something inside.
+# Messages of the interpreter or of NumPy about something inside, never ours.
 INNER = (
     "unsupported operand|not supported between|object is not|has no attribute|codec can't|"
     "too large to convert|cannot convert|only length-1|ambiguous|to unpack|could not convert"

@@ -233,7 +233,7 @@ def test_an_oversized_message_takes_no_memory(language, flood):
                 for number, message in enumerate(flood(sim)):
                     stranger.send(*message)
                     if number % 5 == 0:
-                        time.sleep(0.002)  # as fast as they are taken in
+                        time.sleep(0.002)  # as fast as they are read
         assert client.poll() is None, client.stderr.read()
     client.kill()
     errors = client.stderr.read().decode()

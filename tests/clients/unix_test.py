@@ -95,7 +95,7 @@ def stopped_server(tmp_path, request):
             waiting.close()
         while not greeted:
             client = listener.accept()[0]
-            if client.recv(1):  # who says nothing looked whether somebody is here
+            if client.recv(1):  # a silent connection only checked for a server
                 client.sendall(HELLO + frame("ruedo/info", info([]).encode()))
                 greeted.append(client)
 

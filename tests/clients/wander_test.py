@@ -63,10 +63,10 @@ def test_wander(language, tmp_path):
 
     status = lcmtypes.motion_status_t
     log, picture = tmp_path / "run.log", tmp_path / "seen.jpg"
-    for witness in attempts():  # one that is held up for 0.6 s is stopped by the watchdog
+    for witness in attempts():  # the watchdog stops one that does not run for 0.6 s
         done = wander(language, log, picture)
         reasons = reasons_in(log)
-        # It goes on, or says so; a program that crashed is stopped, too, and says something else.
+        # It continues, or reports why not; a crashed program is stopped, too, with another message.
         was_stopped = status.REASON_WATCHDOG in reasons and (
             done.returncode == 0 or "watchdog" in done.stderr
         )

@@ -19,7 +19,7 @@ SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 LAST = Path(__file__).with_name("engine.abi.gz")
 NEW_ONLY = 4  # abidiff's bits: the interface changed; with 8, so that old programs break
-# What stands behind the class is no part of it.
+# Text after the class is not part of it.
 HIDDEN = r"""
 [suppress_function]
   symbol_name_regexp = .*(4Impl|__get_helper).*

@@ -72,7 +72,7 @@ def test_its_client_drives_this_server():
     assert done.stdout == "0.5 181\n"
 
 
-# What programs and other versions build on (docs/compatibility.md): types by members and constants;
+# The basis of programs and other versions (docs/compatibility.md): types by members and constants;
 # names of the package, and of the members of its classes.
 INVENTORY = """
 import inspect, json, ruedo

@@ -210,7 +210,7 @@ def taken(port, *headers, path="/", count=400):
     held = []
     for _ in range(count):
         one = socket.create_connection(("127.0.0.1", port), timeout=20)
-        with contextlib.suppress(OSError):  # it had to give way
+        with contextlib.suppress(OSError):  # the server closed it
             one.sendall(page(port, *headers, path=path).encode())
             one.recv(1)
         held.append(one)

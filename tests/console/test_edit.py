@@ -224,7 +224,7 @@ def test_a_late_client_of_a_paused_run_gets_its_state(tmp_path):
         comes_to_know(process, 0)
         time.sleep(1)
         with ruedo.connect(timeout=60) as sim:
-            sim.step(200)  # nobody watches
+            sim.step(200)  # without a viewer
             utime = round(200 * sim.step_size * 1e6)
         comes_to_know(process, utime)
 

@@ -521,7 +521,7 @@ def test_a_bag_has_the_drawings_of_clients(drawn):
         (0.625, 0.375),
     ]
     assert [(c.r, c.a) for c in cells.colors] == [(0.5, 1), (0.5, 1), (0.5, 0.25), (0.5, 0.5)]
-    # What is not there any more is deleted.
+    # Removed things are deleted.
     assert [(m.id, m.action) for m in arrays[1]] == [(0, 0), (1, 2), (2, 2), (3, 2), (4, 2)]
     assert arrays[1][0].header.frame_id == "world"
     assert [(m.ns, m.id, m.action) for m in arrays[3]] == [("all", 0, 2)]

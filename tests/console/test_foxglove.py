@@ -78,7 +78,7 @@ def test_the_foxglove_server_equals_the_export(run: tuple[list[dict], dict]) -> 
     for topic in TOPICS:
         here = [line for line in messages if line["topic"] == topic]
         assert here, f"nothing came on {topic}"
-        if topic in ("ruedo/frames", "ruedo/scene"):  # as they were for who came first
+        if topic in ("ruedo/frames", "ruedo/scene"):  # as for the first viewer
             texts = {
                 text for (name, _), all in exported.items() if name == topic for _, text in all
             }

@@ -115,7 +115,7 @@ def test_each_channel_shows_its_newest_message_of_a_moment(log):
             assert newest(viewer, {c: t for c, (t, _) in last.items()}) == {
                 c: d for c, (_, d) in last.items()
             }
-        # What somebody begins to watch while it is paused is shown at once.
+        # A channel chosen during a pause is shown at once.
         viewer.send(bytes([WANT]) + b"p3at/pose")
         newest(
             viewer,
@@ -174,7 +174,7 @@ def test_each_viewer_has_a_moment_of_its_own(tmp_path):
         assert robots(0) == {"p3at"} and robots(1) == {"p3at", "late"}
         assert get(process.port, "/scene/2.json")[0] == 404
         assert get(process.port, "/scene/99999999999999999999.json")[0] == 404
-        # To its end, which a busy server may have reached before it tells that it plays
+        # To its end, which a busy server may reach before it reports that it plays
         late.send(bytes([PLAY, 1]) + struct.pack("<d", 1000.0))
         told = texts_until(late, "playback")
         while (told["speed"], told["now"], told["playing"]) != (1000, told["end"], False):
@@ -284,7 +284,7 @@ def test_fields_are_reported_together_and_arrays_as_a_whole(tmp_path):
         assert rows[0] == pytest.approx((0, 1, 3, 2, 6, 1, nan, 0), nan_ok=True)
         assert rows[1] == pytest.approx((0.001, nan, nan, nan, nan, nan, nan, 50), nan_ok=True)
         assert rows[2] == pytest.approx((0.002, nan, nan, nan, nan, nan, nan, 100), nan_ok=True)
-        many = ",".join(["utime"] * 200)  # of which it tells some
+        many = ",".join(["utime"] * 200)  # of which it sends some
         assert len(get(process.port, f"/history/{many}/p3at/lrf")[1]) < 8 * 200
 
 

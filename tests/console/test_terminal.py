@@ -253,7 +253,7 @@ class Teleop:
             self.read()
         while self.read():
             pass
-        for _ in range(2):  # the first may have been said before the last key was taken
+        for _ in range(2):  # the first may have been sent before the last key was read
             self.said = ""
             self.until(said)
 

@@ -33,8 +33,8 @@ ROBOTS = dict(
     for line in (Path(__file__).parent / "robots.txt").read_text(encoding="utf-8").splitlines()
 )
 
-# Their wheels' joints are fixed, or there is no plugin that drives them: in Gazebo they stand
-# still, too.
+# Their wheels' joints are fixed, or no plugin drives them: in Gazebo they stand still,
+# too.
 STAND_THERE_TOO = {
     "Pioneer 3-DX (MobileRobots, URDF)",
     "Pioneer 3-DX (MobileRobots, xacro)",

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 HALF = 2.0  # m, from the middle of the room to its walls
-# What a robot without a range finder gets in its <include>: nothing of its own file is changed.
+# Added to a robot without a range finder in its <include>: its own file stays unchanged.
 LIDAR = """<sensor name="lidar" type="lidar"><pose>0 0 0.6 0 0 0</pose><update_rate>10</update_rate><lidar><scan><horizontal><samples>360</samples>
 <min_angle>-3.13</min_angle><max_angle>3.13</max_angle></horizontal></scan><range><min>0.1</min><max>10</max></range></lidar></sensor>"""
 ROBOTS = {

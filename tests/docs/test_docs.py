@@ -28,7 +28,7 @@ NETWORK = "ip link set lo up; ip route add 224.0.0.0/4 dev lo; "
 
 
 # Serves the arena until the program ends, which begins once the server answers. One that finds none
-# within the 2 s of connect() was held up, or the server was: it begins again.
+# within the 2 s of connect() did not run, or the server did not: it begins again.
 SERVED = """ruedo run worlds/arena.sdf --quiet & server=$!
 trap 'kill $server; wait $server || true' EXIT
 until python -c 'import ruedo; ruedo.connect().close()'; do kill -0 $server; done

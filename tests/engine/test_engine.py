@@ -97,13 +97,13 @@ def test_commands_are_broadcast_and_nan_means_no_command():
         x = e["pose.pos"][..., 0]
         e.step([0.2, 0.0], 100)
         np.testing.assert_allclose(x, 0.1, atol=1e-12)
-        e.step([[math.nan, math.nan], [0.0, 0.0]], 100)  # r0 goes on, r1 stops
+        e.step([[math.nan, math.nan], [0.0, 0.0]], 100)  # r0 continues, r1 stops
         np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
         e.step(np.zeros((2, 2, 3)), 100)
         np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
 
 
-# What was commanded first acts first, by whichever call: the last one holds.
+# The first command acts first, by whichever call: the last one holds.
 def test_commands_act_in_the_order_of_the_calls():
     stop = lcmtypes.velocity_command_t()
     with engine(worlds=2) as e:
@@ -638,7 +638,7 @@ def test_pictures_are_drawn_only_when_read(monkeypatch):
         assert (e["scan.ranges"] > 0).all()
         with pytest.raises(OSError, match="RUEDO_RENDERER=none"):
             e.observe("eye.data")
-        e.step(n=40)  # it goes on
+        e.step(n=40)  # it continues
         monkeypatch.delenv("RUEDO_RENDERER")
         assert (e["eye.utime"] == 200_000).all()
     monkeypatch.setenv("RUEDO_RENDERER", "none")

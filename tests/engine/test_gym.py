@@ -384,7 +384,7 @@ def test_a_hall_has_the_requested_number_of_people():
         env.close()
 
 
-# Whoever waits for people who are in the way comes through; rewards are the metres nearer, less
+# A robot that waits for people in its way comes through; rewards are the metres nearer, less
 # 0.01 each step, and 5 at the goal.
 def test_a_robot_that_waits_comes_through_a_crowd():
     env = ruedo.gym.CrowdEnv(beams=61, people=4, split="test")
@@ -552,7 +552,7 @@ def test_a_frame_shows_the_scene_from_above():
     envs.close()
 
 
-# What the console shows is a server's run, which goes on with the same state.
+# The console shows a server's run, which continues with the same state.
 @pytest.mark.parametrize("task", ["Crowd", "Navigate"])
 def test_the_console_shows_the_same_episode(task, monkeypatch):
     opened = []

@@ -28,7 +28,7 @@ def observed(engine):
     }
 
 
-# Copies that are drawn, driven and begun anew, in any order, against those of fresh engines, whose
+# Copies that are drawn, driven and reset, in any order, against those of fresh engines, whose
 # copies have never run: 20 engines of 50 copies are 1 000 episodes. 3 s are long enough for many to
 # run into walls and boxes.
 def test_a_reset_equals_a_fresh_start_over_1000_episodes():

@@ -313,7 +313,7 @@ BAD = {
 }
 
 
-# What a sensor's function does, in "sample"; the drive's and the making of both go through the same
+# Faults of a sensor's function, in "sample"; the drive's and the constructors' go through the same
 # code.
 AT_WORK = """#include <cfenv>
 #include <cstdlib>

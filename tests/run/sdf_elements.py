@@ -47,7 +47,7 @@ JOINT_STATE = ["@name", "angle=double:0", "angle/@axis"] + [
     for part in ("position", "velocity", "acceleration")
     for end in ("=double:0", "/@degrees=bool:false")
 ]
-# What is described once and stands in many places is listed whole in one of them.
+# Elements that are described once and occur in many places are listed whole in one of them.
 PLACES = {
     "link.sdf": "world/model",
     "joint.sdf": "world/model",

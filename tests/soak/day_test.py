@@ -57,7 +57,7 @@ class Harm(threading.Thread):
                         self.accepted.append(text)
                     except (ruedo.RuedoError, ValueError):  # the client itself refuses some
                         self.models += 1
-        except ruedo.RuedoError:  # there is no place for one more
+        except ruedo.RuedoError:  # no place for one more
             pass
 
     def check_files(self) -> None:

@@ -114,7 +114,7 @@ def test_nothing_stops_and_nothing_grows(scheme):
     assert last < first + MOST_GROWTH_KB, sizes
     assert len(said) < 30 + 4 * (
         time.monotonic() - begin
-    )  # what is wrong is said once a second at most, by each who says it
+    )  # each part reports errors once a second at most
 
 
 def soak(server, url, scheme, port):
@@ -149,7 +149,7 @@ def soak(server, url, scheme, port):
             sizes.append(resident_kb(server))
             time.sleep(0.1)
         count += sent_by(load)
-        sim.robot("p3at").rotate(0.3).wait(PATIENCE)  # with the load gone, it does as it is told
+        sim.robot("p3at").rotate(0.3).wait(PATIENCE)  # without the load it follows its commands
     finally:
         harm.end = True
         if scheme == "tcpq":

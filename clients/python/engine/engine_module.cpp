@@ -213,7 +213,7 @@ class PyEngine {
     engine.reset(0, seed);
   }
 
-  // What came of it, as the JSON of a verdict; the log is whole then.
+  // The outcome, as the JSON of a verdict; the log is complete then.
   std::string end_run() {
     Engine& engine = this->engine();
     if (!run_) throw std::runtime_error("no run was begun");

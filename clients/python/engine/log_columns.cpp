@@ -38,8 +38,8 @@ nb::object whole_numbers(GrowingBytes& bytes) {
   return array_of(bytes, Primitive::int64, {bytes.size() / sizeof(int64_t)});
 }
 
-// Name, shape of each message's value, values, ends of texts, ends of messages; None where there
-// are none of these.
+// Name, shape of each message's value, values, ends of texts, ends of messages; None without
+// one of these.
 nb::tuple parts_of(Column& column, int64_t messages) {
   const bool is_text = column.type == Primitive::string;
   std::vector<size_t> shape;

@@ -1,4 +1,4 @@
-// What the module's parts share: Python's lock, its signals, and NumPy's types.
+// Shared by the module's parts: Python's lock, its signals, and NumPy's types.
 #pragma once
 
 #include <nanobind/nanobind.h>

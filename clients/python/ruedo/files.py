@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 MOST_YAML_BYTES = 1 << 20
 _MOST_BITS = 14_000  # of a number, which Python can print
-MOST_YAML_VALUES = 100_000  # with each alias counted as what it stands for
+MOST_YAML_VALUES = 100_000  # with each alias counted as its target
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
@@ -98,7 +98,7 @@ def _values(node: Any, known: dict[int, int]) -> int:
     import yaml
 
     if id(node) not in known:
-        known[id(node)] = MOST_YAML_VALUES + 1  # one that holds itself stands for endless values
+        known[id(node)] = MOST_YAML_VALUES + 1  # one that contains itself has endless values
         inner: list[Any] = []
         if isinstance(node, yaml.ScalarNode):
             _check_number(node)
@@ -131,7 +131,7 @@ def _check_value(node: Any) -> None:
 
     try:
         value = yaml.constructor.SafeConstructor().construct_object(node)
-    except yaml.YAMLError:  # a tag that there is not, which is told when all is read
+    except yaml.YAMLError:  # an unknown tag, which is reported when all is read
         return
     except Exception:  # whatever a constructor stumbles over
         kind = node.tag.rpartition(":")[2]

@@ -17,7 +17,7 @@ from .vocabulary import JOINT_MODES, JointMode
 if TYPE_CHECKING:
     from .session.control import Session
 
-# Modes for what is no joint, but a detachable joint's, a lift's or a door's name: the server knows.
+# Modes for a detachable joint, a lift or a door instead of a joint: the server knows the names.
 _OF_OTHERS = (JointMode.ATTACHED, JointMode.FLOOR, JointMode.OPEN)
 
 

@@ -29,7 +29,7 @@ from .transport.stream import is_served
 from .world import World
 
 _MOST_HEARD = 1 << 16  # bytes of warnings that are read at once
-_MOST_WARNED = 1000  # warnings, each of which is said once
+_MOST_WARNED = 1000  # warnings, each of which is printed once
 
 
 def find_ruedo() -> str:

@@ -47,10 +47,10 @@ T = TypeVar("T")
 
 _FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1  # s; where nothing is lost, the last from the beginning
 _ACKNOWLEDGED_TOGETHER = 32  # steps
-_MOST_WANTED = 256  # messages asked for at once
+_MOST_WANTED = 256  # messages requested at once
 _MOST_EARLY = 512  # messages of one channel that wait for their ticks
 _MOST_FRESH = 16384  # messages of all channels since the last tick
-_MOST_BYTES = 256 << 20  # of either: no server goes on with so much unheard
+_MOST_BYTES = 256 << 20  # of either: no server continues with so much unheard
 _MOST_CHANNELS = 1 << 16  # more cannot be subscribed
 _MOST_PARTS = 1024  # of a tick
 _MOST_LISTED = 1 << 20  # messages in the manifests of steps that are not here: 160 steps of a fleet
@@ -221,7 +221,7 @@ class Stepper:
         self._taken = True
         self._resends = 0
         # Usually everything comes once and in order, a step's messages and then its tick, and is
-        # taken as it came. Only when something is lost, late or comes twice is each message put
+        # used as it came. Only if something is lost, late or comes twice each message is put
         # into its place.
         self._fresh: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRESH)  # since the last tick
         self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
@@ -526,7 +526,7 @@ class Stepper:
         if self._early_bytes > _MOST_BYTES:
             self._early_bytes = sum(one[1] for early in self._early.values() for one in early)
         if self._early_bytes > _MOST_BYTES:
-            for early in self._early.values():  # what is missed is asked for
+            for early in self._early.values():  # missing messages are requested
                 early.clear()
             self._early_bytes = 0
 
@@ -685,7 +685,7 @@ class Stepper:
             try:
                 self._take_pieces(decode(lcmtypes.resend_reply_t, reply.body))
             except Exception:
-                return  # damaged: it is asked for again
+                return  # damaged: it is requested again
         elif reply.sequence == self._grant[0] and not self._taken:
             self._taken = self._ask_now = True  # it was repeated: its ticks may be lost
 

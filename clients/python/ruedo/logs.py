@@ -67,7 +67,7 @@ def events(path: str | os.PathLike[str]) -> Iterator[Event]:
 class LogChannel(NamedTuple):
     """A channel of a log."""
 
-    type: str  # "pose_t"; "" where it is none of Ruedo's
+    type: str  # "pose_t"; "" if it is not one of Ruedo's
     messages: int
     begin: float  # s of sim time: the first message
     end: float  # s: the last

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("ruedo")
 
-# A primitive goes out again until a status shows it: messages may be lost, and the server takes
-# each once. One that no status has shown after so many statuses and seconds reaches nobody, or was
+# A primitive is sent again until a status shows it: messages may be lost, and the server executes
+# each once. One that no status has shown after so many statuses and seconds is lost, or was
 # replaced at once.
 _FIRST_AGAIN, _LAST_AGAIN = 0.1, 1.0  # s of real time
 _UNSEEN_STATUSES = 20
@@ -62,9 +62,7 @@ class Motion:
         self._message = ("", b"")  # its channel and command
         self._again = _FIRST_AGAIN
         self._again_at = 0.0  # s of time.monotonic()
-        self._utime = (
-            -1
-        )  # of the newest status; before it is another run's, or of a reset that info will tell of
+        self._utime = -1  # of the newest status; earlier ones are another run's, or of a reset that info will report
         self._shown = -1  # of the newest status that shows it
         self._sent = time.monotonic()
         self._news = threading.Condition()
@@ -311,7 +309,7 @@ class Drivers:
         self._connection = connection
         self._lock = threading.Lock()
         self._all: dict[str, Driver] = {}
-        self.repeating: set[Driver] = set()  # those that were told something
+        self.repeating: set[Driver] = set()  # those with a command to repeat
         self._wake = threading.Condition()
         self._thread: threading.Thread | None = None
 

@@ -45,7 +45,7 @@ from .launch import find_ruedo
 
 _PARTING_S = 10.0  # that a run has to end its client
 _LONGEST_S = 1e6  # the system cannot wait for ever at once
-# What `ruedo regress` takes once, and arguments set.
+# Options that `ruedo regress` accepts once, and arguments set.
 _SINGLE = {
     *("client", "duration", "seed", "record", "robot", "no_contact", "clearance"),
     *("odometry_error", "golden", "lockstep", "script"),

@@ -139,7 +139,7 @@ class Robot:
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {', '.join(d.name for d in self.devices)}>"
 
-    # What it is.
+    # Description.
 
     @property
     def _info(self) -> Any:

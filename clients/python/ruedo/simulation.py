@@ -78,7 +78,7 @@ class Simulation(Requests):
             self.close()
             raise
 
-    # What there is.
+    # Description.
 
     @property
     def version(self) -> str:

@@ -36,7 +36,7 @@ _MOST_LOST = 1_000_000_000  # in one gap: a false time may make it any
 _LOOK_SECONDS = 0.5  # for the server, while nothing comes
 _MOST_KEPT, _MOST_KEPT_BYTES = 256, 4 << 20  # of what came before, where no depth is larger
 MOST_DEPTH = 1000
-_MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps tell no more than that
+_MOST_UNEVEN = 0.25  # periods: with longer steps, gaps of samples show no losses
 
 
 class Form(NamedTuple):
@@ -44,7 +44,7 @@ class Form(NamedTuple):
 
     fingerprint: bytes | None  # of the messages that it can be made of; None: of any
     make: Callable[[bytes], Any]
-    key: Any  # what tells it from others: the class that lcm-gen made, or "raw"; None: the channel's own samples
+    key: Any  # distinguishes it: the class that lcm-gen made, or "raw"; None: the channel's own samples
 
 
 RAW = Form(None, bytes, "raw")
@@ -196,7 +196,7 @@ class Stream(Reader[T]):
         self._callbacks = Callbacks(channel, keep=connection.faults.note)
         self._missed = 0  # by the callbacks
         self._has_utime = type in samples.CONVERSIONS
-        # s; 0: what is missing cannot be told.
+        # s; 0: lost samples cannot be counted.
         even = rate > 0.0 and connection.info.step_us * 1e-6 * rate <= _MOST_UNEVEN
         self._period = 1.0 / rate if even else 0.0
 

@@ -32,7 +32,7 @@ class WorldInfo:
         self.step_us: int = head.step_us
         self.features: int = head.features
         self.paused: bool = head.paused
-        self.joint_limits: dict[str, JointLimits] = {}  # of the robots that were asked for
+        self.joint_limits: dict[str, JointLimits] = {}  # of the requested robots
         self.robots: dict[str, Any] = {r.name: r for p in parts for r in p.robots}
         self.devices: dict[str, list[Any]] = defaultdict(list)  # by robot
         self.channels: dict[str, list[Any]] = defaultdict(list)  # by robot

@@ -5,9 +5,9 @@ that do not exist.
 import socket
 import struct
 
-VENDOR = bytes((1, 0x7F))  # nobody's
+VENDOR = bytes((1, 0x7F))  # of no vendor
 PARTICIPANT = bytes.fromhex("000001c1")
-# Who tells of participants and of readers, and who is told.
+# Announcers and detectors of participants and of readers.
 PARTICIPANTS = bytes.fromhex("000100c7"), bytes.fromhex("000100c2")
 READERS = bytes.fromhex("000004c7"), bytes.fromhex("000004c2")
 

@@ -26,7 +26,7 @@ def driven(log: Path, *arguments: str) -> bytes:
         str(log),
         *arguments,
     ) as run:
-        # One scan each 0.1 s; the one at 6 s is answered by nobody.
+        # One scan each 0.1 s; the one at 6 s gets no answer.
         controller = subprocess.Popen(
             [sys.executable, str(HERE / "controller.py"), str(run.domain), "60"],
             stdout=subprocess.PIPE,

@@ -197,7 +197,7 @@ def driving(sim):
     fastest = 0.0
     while fastest == 0.0 or robot.motion.latest(PATIENCE).v > 0.0:
         fastest = max(fastest, robot.motion.next(PATIENCE).v)
-    say("published", fastest)  # it lapsed: nobody repeats it
+    say("published", fastest)  # it lapsed: nothing repeats it
 
 
 def saves(sim):

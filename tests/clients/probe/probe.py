@@ -119,7 +119,7 @@ def primitives(sim, name):
 
     def run(what, motion):
         begin = robot.pose.next(PATIENCE)
-        sim.pause()  # else it may be over, for who looks late
+        sim.pause()  # else it may be over for a late client
         motion = motion()
         early = motion.done
         sim.resume()
@@ -139,12 +139,12 @@ def primitives(sim, name):
     run("rotate", lambda: robot.rotate(1.2))
     run("turn_to", lambda: robot.turn_to(0.0))
     run("arc", lambda: robot.arc(0.8, 0.5))
-    replaced = robot.advance(5.0, speed=0.05)  # slowly: whoever is late finds it under way
+    replaced = robot.advance(5.0, speed=0.05)  # slowly: a late client finds it under way
     sim.sleep(0.5)
     robot.stop().wait(PATIENCE)
     attempt("replaced", replaced.wait)
     running = robot.advance(5.0, speed=0.05)
-    attempt("refused", robot.advance(2e6).wait)  # further than the server allows: what runs goes on
+    attempt("refused", robot.advance(2e6).wait)  # further than allowed: the current one continues
     attempt("too_long", lambda: running.wait(0.3))
     robot.stop().wait(PATIENCE)
 

@@ -8,7 +8,7 @@ export default async function branch({ page, seen, until, check, ready, picture 
   await page.keyboard.down("KeyA");
   await until("(and turns)", () => Math.abs(window.ruedo.poses.to[1]) > 0.3);
   check("the present has no branch", !(await page.locator("#branch").isVisible()));
-  // A past state, while the run goes on with its robot driving.
+  // A past state, while the run continues with its robot driving.
   await page.evaluate(() => {
     const { rewind } = window.ruedo;
     rewind.show(rewind.range.end - 0.8);

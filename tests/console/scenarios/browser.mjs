@@ -100,7 +100,7 @@ async function serveSources() {
   }
 }
 
-// What the page shows, in one line.
+// The state that the page shows, in one line.
 const shown = () =>
   page
     .evaluate(() => {
@@ -134,7 +134,7 @@ const tools = {
   expect: (pattern) => {
     expected = pattern;
   },
-  // Waits for a line from who started this.
+  // Waits for a line from the program that started this.
   told: async () => (await lines.next()).value,
   // Waits until a condition in the page holds: a function, since the page evaluates no texts. A
   // working page reaches no limit, however slow the machine.
@@ -163,7 +163,7 @@ const tools = {
     return (await number.jsonValue()).value;
   },
   clock: async () => parseFloat(await page.locator("#clock").innerText()),
-  // What the server says of itself: sim time in us, paused, rate.
+  // The server's state: sim time in us, paused, rate.
   server: () =>
     page.evaluate(async (body) => {
       const { session } = window.ruedo,

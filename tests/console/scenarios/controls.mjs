@@ -44,7 +44,7 @@ export default async function controls(tools) {
   );
   await page.locator("#canvas").focus();
 
-  // Starts anew, whatever the last drive did while a busy machine was not looking.
+  // Starts again, whatever the last drive did while a busy machine was late.
   const again = async () => {
     await stands("(it stands)");
     const epoch = await page.evaluate(() => window.ruedo.clock.epoch);

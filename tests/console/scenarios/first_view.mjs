@@ -1,5 +1,5 @@
-// What a page shows of a world at first. Given: {"corners": places that are in view, "eye": where
-// the file's own camera is, "red": places where something red is seen}.
+// The first view of a world. Given: {"corners": places that are in view, "eye": the place of the
+// file's own camera, "red": places with something red}.
 export default async function firstView({ page, given, until, check, picture }) {
   await page.setViewportSize({ width: 1000, height: 520 });
   await until(

@@ -6,7 +6,7 @@ import { readFileSync, readdirSync } from "node:fs";
 
 const kTicks_per_s = 100; // of /proc
 
-// Processor time (s) so far, by kind of process, of all child processes.
+// Processor time (s), by kind of process, of all child processes.
 function cpuTimes() {
   const processes = readdirSync("/proc")
     .filter((name) => /^\d+$/.test(name))

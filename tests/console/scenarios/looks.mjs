@@ -1,4 +1,4 @@
-// What the view measures and exports: coordinates, distances, edges, pictures, videos, and links
+// The measurements and exports of the view: coordinates, distances, edges, pictures, videos, and links
 // back to it.
 import { readFileSync } from "node:fs";
 

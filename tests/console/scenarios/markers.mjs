@@ -1,5 +1,5 @@
-// What clients draw, live and from a log. Given: the names of its layers, the moments of a log with
-// what is drawn then, or null for a live run.
+// Drawings of clients, live and from a log. Given: the names of its layers, the times of a log with
+// the drawings then, or null for a live run.
 export default async function markers({ page, given, seen, until, check, ready, picture }) {
   await ready();
   // For each layer, how many objects it shows, and where its first one is.

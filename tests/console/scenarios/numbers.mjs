@@ -25,7 +25,7 @@ export default async function numbers({ page, until, check, ready, server }) {
     const before = await x();
     if (typed !== null) await field.fill(typed);
     await field.press("Enter");
-    const { utime } = await server(); // answered behind what the field may have asked for
+    const { utime } = await server(); // answered after any request of the field
     await until("(time passes)", (s) => window.ruedo.page.now.time_s > s, utime * 1e-6);
     const after = await x();
     check(`${what} does not move the robot`, after > before - 0.01, `${before} to ${after}`);

@@ -1,5 +1,5 @@
-// What goes wrong is said: a robot that falls out of the world, driving while paused, graphics that
-// the browser takes away. And what a hand without a mouse does.
+// Faults are reported: a robot that falls out of the world, driving while paused, graphics that the
+// browser takes away. And control without a mouse.
 export default async function odd({ page, until, check, ready, server, expect, picture }) {
   await page.setViewportSize({ width: 1000, height: 520 });
   await ready();

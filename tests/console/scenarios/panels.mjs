@@ -1,5 +1,5 @@
-// Panels beside the scene: where they are, further views and cameras, what was said, messages and
-// faults by hand, a part of the time line.
+// Panels beside the scene: their places, further views and cameras, notes, messages and faults by
+// hand, a part of the time line.
 export default async function panels({ page, until, check, ready, still, picture }) {
   await page.setViewportSize({ width: 1100, height: 600 });
   await ready();
@@ -41,7 +41,7 @@ export default async function panels({ page, until, check, ready, still, picture
   );
   await picture("faults");
 
-  // ---- what was said
+  // ---- notes
   await page.getByRole("tab", { name: "Notes" }).click();
   check(
     "notes are kept",
@@ -218,7 +218,7 @@ async function arrange({ page, until, check, still, picture }) {
   await until("one view is drawn then", () => window.ruedo.stage.further.size === 0);
 }
 
-// What is clicked in a further view is what is seen there, from where that view looks.
+// A click in a further view selects the thing that is visible there, from that view's camera.
 async function picks({ page, until, check, still }) {
   const onFurther = ([x, y, z]) =>
     page.evaluate(

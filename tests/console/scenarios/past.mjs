@@ -1,5 +1,5 @@
-// The last minutes of a run are viewed while it goes on: by the time line, with models that came
-// and went meanwhile.
+// The last minutes of a run are viewed while it continues: by the time line, with models that were
+// added and removed meanwhile.
 export default async function past({ page, seen, until, check, ready, server, picture, onScreen }) {
   await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
   await ready();
@@ -59,7 +59,7 @@ export default async function past({ page, seen, until, check, ready, server, pi
   );
   await picture("past");
   const first = await server();
-  // Meanwhile ruedo/info, which comes once a second, tells another time.
+  // Meanwhile ruedo/info, which comes once a second, has another time.
   await until(
     "the run goes on meanwhile",
     (t) => window.ruedo.rewind.range.end > t + 2.5,

@@ -133,7 +133,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
     (n) => window.ruedo.stage.renderer.info.render.triangles > n - 50,
     looks,
   );
-  // ---- as the user wants it drawn
+  // ---- the user's settings of drawing
   const cloud = () => {
     const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR"),
       { array } = object.geometry.getAttribute("color");

@@ -132,7 +132,7 @@ class Runner:
                 outcome.fail(
                     "crashed", "controller", f"the controller ended with SystemExit: {error.code}"
                 )
-        except KeyboardInterrupt:  # the worker is told to end
+        except KeyboardInterrupt:  # the worker must end
             raise
         except BaseException as error:
             outcome.fail("crashed", "controller", f"the controller raised {named(error)}"[:300])

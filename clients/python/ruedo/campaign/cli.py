@@ -229,7 +229,7 @@ def _run(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     junit = None
     if arguments.junit:
-        campaign.out.mkdir(parents=True, exist_ok=True)  # it may be meant to lie there
+        campaign.out.mkdir(parents=True, exist_ok=True)  # the output may belong there
         junit = _output(campaign, "--junit", arguments.junit)
     if not arguments.quiet:
         _name_unknown_programs(campaign)

@@ -37,7 +37,7 @@ class Output:
     def text(self) -> str:
         """The end of what was printed so far."""
         end = (self._before + self._last())[-_TAIL:].decode(errors="replace")
-        # What is printed within a moment is over before anybody has looked.
+        # A short output is complete before the next look at the file.
         return (_LEFT_OUT if self._is_long or self._size() > _MOST_BYTES else "") + end
 
     def close(self) -> None:

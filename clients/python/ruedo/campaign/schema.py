@@ -12,8 +12,8 @@ from ..arguments import MOST_SEED
 from ..files import parse_yaml
 from .errors import SpecError, missing
 
-HALF = re.compile(r"[\ud800-\udfff]")  # what stands for what no file can hold
-# A controller may be named after a file, whatever that is called.
+HALF = re.compile(r"[\ud800-\udfff]")  # surrogates, which no file can hold
+# A controller may have the name of any file.
 CONTROLLER_NAME = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,255}\Z"
 _PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}\Z"
 NAME_RULES = {

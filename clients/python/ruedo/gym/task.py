@@ -61,7 +61,7 @@ class Task:
     engine: Engine
     num_envs: int
     scenes: list[Any]  # of each environment's episode
-    acting: NDArray[np.bool_]  # during `commands`: who takes an action; the others begin just now
+    acting: NDArray[np.bool_]  # during `commands`: those that take an action; the others begin now
 
     def scene(self, number: int) -> Scene | World | str:
         """The scene of that number: a world, its SDF, or a `ruedo.rooms.Scene` (or a subclass),
@@ -93,7 +93,7 @@ class Task:
         """
         raise NotImplementedError(f"{type(self).__name__} has no observe()")
 
-    # ---- What a task looks at.
+    # ---- The state that a task reads.
 
     def sensor(self, name: str, robot: str | None = None) -> NDArray[Any]:
         """(environments, ...): the newest values of a sensor's field, "lrf.ranges"; a read-only

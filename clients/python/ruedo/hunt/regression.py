@@ -44,7 +44,7 @@ def keep(found: Any, folder: Path) -> Path:
     check_keep(folder)
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W", "_", folder.name)
-    reason = for_terminal(found.reason)  # a stranger's words, in comments
+    reason = for_terminal(found.reason)  # an untrusted text, in comments
     content = dict(found.content)
     world = found.case.what["world"]
     home, places = beside(world["file"], found.files, found.folder)

@@ -107,7 +107,7 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
 
     def fails(choices: Choices) -> bool:
         nonlocal left
-        if repr(choices) not in hits:  # else it is asked again whether that fails
+        if repr(choices) not in hits:  # a known failure needs no second run
             if left <= 0:
                 return False
             left -= 1

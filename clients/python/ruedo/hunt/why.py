@@ -31,7 +31,7 @@ from ..files import read_bytes
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL, Event, events
 from .obstacles import models_of, without_model
 
-# What somebody could have done from a moment on: m/s, rad/s.
+# Commands that a controller could have sent from a moment on: m/s, rad/s.
 MANOEUVRES = {
     "stop": (0.0, 0.0),
     "go back": (-0.3, 0.0),
@@ -39,7 +39,7 @@ MANOEUVRES = {
     "turn right": (0.0, -0.8),
 }
 _PERIOD_S = 0.25  # between moments that are tried
-_AFTER_S = 3.0  # how long a branch goes on after the run failed
+_AFTER_S = 3.0  # how long a branch continues after the failure
 _MOST = 80  # moments
 _NO_OBSTACLES = ("ground_plane", "sun")  # without the ground a robot falls, and touches nothing
 _MOST_CHANGES = 12  # of the world's models, and of other cases' parameters

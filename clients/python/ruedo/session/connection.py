@@ -109,7 +109,7 @@ class Connection:
         self._ids = 0  # of the newest primitive
         self._over = ""  # the server's last word on the run
         self._new_run = Callbacks("a new run", keep=self.faults.note)
-        self._closing = threading.Lock()  # whoever has it closes
+        self._closing = threading.Lock()  # its holder closes
         self._ended = threading.Event()  # all that close() ends
         self.bus = Bus(transport or open_transport(url))
         self.bus.before_turn = self._before_turn
@@ -293,7 +293,7 @@ class Connection:
         """Whether messages may be of the next run, whose info has not arrived yet."""
         return self._watch.in_doubt
 
-    # What the server says of itself.
+    # The server's own description.
 
     @property
     def info(self) -> WorldInfo:

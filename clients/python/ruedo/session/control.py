@@ -131,7 +131,7 @@ class Session:
         if not self._connection.is_of_our_run(reply.run_id):
             return  # another server's, which was not asked
         reply.text = for_terminal(reply.text)
-        if reply.code == lcmtypes.reply_t.ENDED and not reply.session:  # nobody asked
+        if reply.code == lcmtypes.reply_t.ENDED and not reply.session:  # without a request
             self._connection.note_end(reply.text)
             return
         with self._news:
@@ -164,7 +164,7 @@ class Session:
                     )
                 if time.monotonic() >= deadline:
                     raise Timeout(f"no reply to {_KINDS[kind]} on ruedo/reply within {timeout:g} s")
-                # Not under the lock: it may take long, and the receiving thread goes on meanwhile.
+                # Not under the lock: it may take long, and the receiving thread continues.
                 self.publish(kind, session, sequence, encoded)
                 with self._news:
                     self._news.wait_for(lambda: self._reply is not None, _REPEAT_SECONDS)

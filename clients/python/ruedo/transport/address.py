@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
-FALLBACK_URL = "tcpq://127.0.0.1:7700"  # what `ruedo run` serves where there is no multicast route
+FALLBACK_URL = "tcpq://127.0.0.1:7700"  # of `ruedo run` without a multicast route
 
 _DEFAULTS = {"udpm": ("239.255.76.67", 7667), "tcpq": ("127.0.0.1", 7700)}  # LCM's own
 

@@ -41,7 +41,7 @@ class Bus:
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
         # Told first of what came at once; for a client that collects.
         self.on_arrived: Callable[[arrivals.Arrived], object] = _nothing
-        # What the receiving thread does each time before it waits; returns for how long, s.
+        # The receiving thread calls this before it waits; returns the longest time to wait, s.
         self.before_turn: Callable[[], float] = _as_usual
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive

@@ -45,7 +45,7 @@ class _Partial:
     size: int
     count: int
     fragments: dict[int, tuple[int, bytes]] = field(default_factory=dict)  # offset and data
-    channel: str | None = None  # None: nobody listens to it, or its fragment has not come
+    channel: str | None = None  # None: without a subscription, or its fragment has not come
     memory: int = 0
 
     def joined(self) -> bytes | None:
@@ -134,7 +134,7 @@ class MulticastTransport:
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         arrived: arrivals.Arrived = []
         deadline = time.monotonic() + seconds
-        # What nobody listens to, such as what was sent here, is no end of the waiting.
+        # A message without a subscription, such as one sent here, does not end the waiting.
         while not arrived and not self._closed:
             left = max(0.0, deadline - time.monotonic())
             if not self._poll.poll(math.ceil(left * 1e3)):

@@ -39,7 +39,7 @@ def connect(address: Address) -> socket.socket:
     local = address.scheme == "unix"
     end = socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_STREAM)
     try:
-        # A server that takes nothing holds nobody up for longer.
+        # A server that reads nothing blocks no caller for longer.
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
         if local:
             end.connect(address.path)
@@ -75,7 +75,7 @@ def is_served(address: Address) -> bool:
             end.setblocking(False)
             end.connect(address.path)
             _check_peer(end)
-    except BlockingIOError:  # it accepts nobody just now
+    except BlockingIOError:  # its queue is full
         return True
     except OSError:
         return False
@@ -133,7 +133,7 @@ class StreamTransport:
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         connection = self._socket
-        if connection is None:  # those who wait find out by their timeouts
+        if connection is None:  # waiting threads notice by their timeouts
             time.sleep(min(seconds, 0.1))
             if not self._closed:
                 with contextlib.suppress(OSError):

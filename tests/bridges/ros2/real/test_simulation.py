@@ -451,7 +451,7 @@ def test_states_of_the_simulation(client):
             told(PLAYING),
         ],
     )
-    # The world goes on, so that what is refused cannot be seen in it.
+    # The world advances, so that a refusal cannot be seen in it.
     assert (
         client.call("set_simulation_state", SimulationState(state=PLAYING)).result.result == already
     )

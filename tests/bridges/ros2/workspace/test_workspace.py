@@ -61,7 +61,7 @@ def test_nodes_in_a_robots_namespace_know_its_frames(middleware, layout, frame):
             place = subprocess.check_output(words, env=ros.environment, timeout=PATIENCE)
             found[target] = list(map(float, place.split()))
         assert found["base_link"] == pytest.approx(at, abs=1e-6)
-        assert found["odom"] == pytest.approx(at, abs=0.1)  # nobody drives
+        assert found["odom"] == pytest.approx(at, abs=0.1)  # without a command
         subprocess.run(["ros2", "daemon", "stop"], env=ros.environment, capture_output=True)
 
 
