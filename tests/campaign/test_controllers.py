@@ -151,7 +151,7 @@ def test_a_controller_waits_for_the_first_sample_that_it_reads(tmp_path):
     (tmp_path / "c.yaml").write_text(UNTIL_THE_FIRST_SCAN)
     results = Campaign(tmp_path / "c.yaml").run(workers=1)
     found = {(case.controller, case.parameters["last"]): row for case, row in results.done}
-    # For a second, after 0.3 m/s^2 from rest: 0.2 - 0.2^2 / (2 * 0.3) m. Without it: no motion.
+    # For a second, after 0.3 m/s^2 from rest: 0.2 - 0.2^2 / (2 * 0.3) m. Without samples: none.
     for name, last, way in (("drive", 1, 0.1333), ("looks", 1, 0.1333), ("looks", 0, 0.0)):
         assert found[name, last]["status"] == "passed", found[name, last]
         assert found[name, last]["metrics"]["path_m"] == pytest.approx(way, abs=0.002)
