@@ -12,7 +12,7 @@ namespace ruedo::world {
 // --spawn MODEL[:NAME]@X,Y[,YAW]
 struct Spawn {
   std::string model;  // a file, or the name of a model that the search path finds ("p3at")
-  std::string name;   // empty: the model's own name, with _2, _3, ... if it is taken
+  std::string name;   // empty: the model's own name, with _2, _3, ... if it exists
   double x = 0, y = 0, yaw = 0;  // m, m, rad; the height follows from the ground below
 };
 

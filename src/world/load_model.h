@@ -38,7 +38,7 @@ void check_channel_names(const ModelInstance& instance, const Source& source);
 // of the link y of x. "": none.
 std::string shared_path(const ModelInstance& one, const ModelInstance& other);
 
-// Reports models of a world that share a path: who asks for it cannot tell which is meant.
+// Reports models of a world that share a path: a request for it would be ambiguous.
 void name_shared_paths(const WorldModel& world, Findings& findings);
 
 // The file that load_model() would read. Throws InputError if it does not exist.

@@ -39,8 +39,8 @@ Draw parse_draw(const std::string& text);
 // A draw: the target, with the model's own name, and its value.
 using Drawn = std::vector<std::pair<std::string, double>>;
 
-// The world for a seed. What is not drawn is shared with `world`. Throws InputError for a target
-// that does not exist, a value that its reader refuses, and a robot for which there was no free
+// The world for a seed. Parts that are not drawn are shared with `world`. Throws InputError for a
+// target that does not exist, a value that its reader refuses, and a robot without a free
 // place.
 std::shared_ptr<const WorldModel> randomized(const WorldModel& world,
                                              const std::vector<Draw>& draws, uint64_t seed,

@@ -135,7 +135,7 @@ std::string resolved(const std::string& wanted, const std::vector<std::string>& 
                            listed(keys));
 }
 
-// A noise of type none reads nothing else, so a deviation set alone would do nothing. To be asked
+// A noise of type none reads nothing else, so a deviation set alone would do nothing. Call this
 // when everything is set, since the type may be set after it.
 void require_noise(const Element& sensor, const std::string& key, const std::string& option) {
   const std::string end = ".noise.";
@@ -153,7 +153,7 @@ void require_noise(const Element& sensor, const std::string& key, const std::str
                                       : "; set " + noise_key + ".type=gaussian, too"));
 }
 
-// What holds the value is the option's, too: it may be the one to refuse it.
+// The parent of the value gets the option as its source, too: it may refuse the value.
 void set_text(Element& element, const std::string& key, const std::string& value,
               const Source& source) {
   Element* at = &element;

@@ -53,7 +53,7 @@ std::vector<std::string> world_names() {
 
 std::string world_file(const std::string& name) {
   std::error_code error;
-  if (fs::exists(name, error) || error) return name;  // an error is for who opens it to say
+  if (fs::exists(name, error) || error) return name;  // opening it reports an error
   if (name.empty() || name.find('/') != std::string::npos || fs::path(name).has_extension())
     throw InputError({name, 0}, "no such file");
   std::vector<std::string> searched;

@@ -153,8 +153,7 @@ class LockstepClient {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::milliseconds kAgain{
-      4};  // until an unanswered request is repeated
+  static constexpr std::chrono::milliseconds kAgain{4};  // until an unanswered request is repeated
   static constexpr std::chrono::seconds kPatience{120};  // with a call
 
   struct Step {

@@ -82,7 +82,7 @@ struct Reader {
           "<" + std::string(element) + "> of the plugin " + name + " is not supported: " + text);
   }
 
-  // What moves otherwise than its controller says.
+  // Joints that something else than the controller moves.
   void name_moved(const Element& at, const Joint& held) const {
     const auto& drive = model.drive;
     const ModelJointIndex index(&held - model.joints.data());
@@ -131,7 +131,7 @@ struct Reader {
                      "the plugin " + name + " has no <joint_name>; it holds nothing");
   }
 
-  // They move nothing here that has to be told.
+  // They move nothing here that needs a finding.
   void names() const {
     for (const Element* written : plugin.all("joint_name")) joint(*written);
   }

@@ -309,7 +309,7 @@ std::unique_ptr<Element> drive_of(const Controller& controller, const Model& mod
   return drive;
 }
 
-// The nearest rate of a SampleClock: an odd one is no reason to stand still.
+// The nearest rate of a SampleClock: an odd rate must not stop the robot.
 std::optional<double> rate_of(const Element& written, const std::string& where,
                               Findings& findings) {
   constexpr double kFastest_hz = 1e6, kParts = 1e9;

@@ -36,7 +36,7 @@ bool is_nan(const std::string& text);
 bool is_infinite(const std::string& text);  // of either sign
 // A size, from 0; 0, NaN or nothing mean that the controller has none.
 std::optional<double> positive(const Element* written);
-// A limit, likewise; infinity is none either. `signed_`: of a number that may be below 0, as those
+// A limit, likewise; infinity means unlimited. `signed_`: of a number that may be below 0, as those
 // backwards are, the absolute value.
 std::optional<double> limit_in(const Element* written, bool signed_ = false);
 
@@ -45,7 +45,7 @@ std::string unknown_joint(const Controller& controller, const std::string& joint
 
 // One file may give the types, and another the parameters.
 std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files);
-// What names wheels or joints as a controller does, but belongs to none of these: a type is
+// Entries with wheels or joints like a controller's that belong to none of these: a type is
 // missing.
 std::vector<Controller> untyped_in(const std::vector<std::shared_ptr<const Element>>& files,
                                    const std::vector<Controller>& controllers);

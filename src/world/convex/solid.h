@@ -33,7 +33,7 @@ double volume_of(const ConvexPiece& hull);
 // The concave edges of a closed surface; nullopt: it is not closed.
 std::optional<std::vector<ConcaveEdge>> concave_edges(std::span<const Triangle> surface);
 
-// What some half-spaces leave of a solid. Lengths below `kTiny` count as 0: solids are of size 1.
+// The part of a solid in some half-spaces. Lengths below `kTiny` count as 0: solids are of size 1.
 class Part {
  public:
   static constexpr double kTiny = 1e-5;
@@ -41,7 +41,7 @@ class Part {
   // whole: outlives the part.
   Part(std::span<const Triangle> whole, std::vector<ConcaveEdge> concave);
 
-  // What lies in the half-space; nullopt: nothing, or all.
+  // The part in the half-space; nullopt: nothing, or all.
   std::optional<Part> in(const HalfSpace& half) const;
 
   std::span<const ConcaveEdge> concave() const { return concave_; }

@@ -32,8 +32,8 @@ class ControllerFiles {
   // The files in the parameter folders of the package that contains `from`, then of neighbouring
   // packages, sorted by name.
   const std::vector<std::string>& beside(const std::string& from);
-  // Null: it names no controller, and no plugin names it. Throws InputError if it is no YAML, or
-  // beyond the bounds.
+  // Null: it has no controller, and no plugin refers to it. Throws InputError if it is not YAML, or
+  // exceeds the limits.
   std::shared_ptr<const Element> read(const std::string& path, bool named = false);
 
  private:
@@ -46,7 +46,7 @@ class ControllerFiles {
 
   const ResourceFinder& resources_;
   std::map<std::string, std::vector<std::string>> beside_;  // by folder
-  std::map<std::pair<std::string, bool>, File> files_;      // by path, and whether it is named
+  std::map<std::pair<std::string, bool>, File> files_;      // by path, and whether it is referenced
   size_t bytes_ = 0, entries_ = 0;
 };
 

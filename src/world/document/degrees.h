@@ -1,4 +1,4 @@
-// Finds degrees written where radians are meant.
+// Finds degrees written in place of radians.
 #pragma once
 
 #include "ruedo/element.h"

@@ -1,7 +1,7 @@
-// What loading a model from an untrusted source may cost: time, and memory for its meshes.
+// The budget for loading a model from an untrusted source: time, and memory for its meshes.
 //
-// The reader calls take_time() before long operations, and reports the memory it uses; anybody may
-// call leave_off(). Thread-safe.
+// The reader calls take_time() before long operations, and reports the memory it uses; any caller
+// may call leave_off(). Thread-safe.
 #pragma once
 
 #include <atomic>

@@ -12,7 +12,7 @@ inline bool is_reserved_name(std::string_view name) {
   return name == "world" || (name.size() >= 4 && name.starts_with("__") && name.ends_with("__"));
 }
 
-// That of a <model>. Gazebo Classic takes "world", which stands for the world here: it is replaced.
+// The name of a <model>. Gazebo Classic accepts "world", the world's name here: it is replaced.
 inline constexpr const char* kModelNamedWorld = "world_model";
 std::string name_of_model(const Element& element);
 

@@ -28,7 +28,7 @@ class ResourceFinder {
   // Whether a file lies in the search folders after following links, and not below a folder whose
   // name begins with a dot.
   bool reaches(const std::string& path) const;
-  // Whether a file that nobody names, but that lies where one is looked for, may be read.
+  // Whether a file that is found by a search, without a reference to it, may be read.
   bool may_read(const std::string& path) const { return !for_strangers_ || reaches(path); }
 
   // The absolute path of the file or folder that `uri`, written in the file `from`, names.

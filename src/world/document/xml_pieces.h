@@ -30,7 +30,7 @@ class XmlPieces {
   XmlPieces(std::string_view text, size_t most_attributes)
       : text_(text), most_attributes_(most_attributes) {}
 
-  // False at the end, or where the text is no XML: the parser reads no further, either.
+  // False at the end, or where the text is not XML: the parser reads no further, either.
   bool next(XmlPiece& piece);
 
  private:

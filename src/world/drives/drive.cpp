@@ -1,4 +1,4 @@
-// <ruedo:drive> and <ruedo:odometry>. What they leave out is derived from the wheels' joints and
+// <ruedo:drive> and <ruedo:odometry>. Missing values are derived from the wheels' joints and
 // shapes.
 #include "world/drives/drive.h"
 
@@ -81,8 +81,8 @@ Vec3 middle(const Model& model, const std::vector<ModelJointIndex>& joints) {
   return sum / static_cast<double>(joints.size());
 }
 
-// x points forward, with the left wheels on the left. If the wheels are named the other way round
-// (as in some robots), the model's own x stays forward.
+// x points forward, with the left wheels on the left. If the file swaps the wheels (as some robots
+// do), the model's own x stays forward.
 Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
                 const Element& element) {
   Vec3 across = left - right;
@@ -542,7 +542,7 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
 
 namespace {
 
-// What has no counterpart here, each once.
+// Elements without a counterpart here, each once.
 void name_plugin(const Element& plugin, const PluginKind& kind, const Model& model,
                  const std::string& where, Findings& findings, std::set<std::string>& named) {
   std::string text;

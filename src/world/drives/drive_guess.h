@@ -21,7 +21,7 @@ struct GuessedDrive {
 GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled);
 
 // The lowest z in the model that a joint and the shapes of its subtree reach, and that of all
-// shapes; infinity: there are none.
+// shapes; infinity without one.
 double lowest_point_below(const Model& model, ModelJointIndex joint);
 double lowest_point(const Model& model);
 

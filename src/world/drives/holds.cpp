@@ -67,7 +67,7 @@ void read_holds(const std::vector<const Element*>& plugins, const std::string& w
 
 namespace {
 
-// What is wrong with a hold, in words; "": nothing.
+// The error in a hold; "": none.
 std::string fault_of(const Hold& hold, InstanceIndex holder, const WorldModel& world,
                      const BodyLayout& layout) {
   const auto other = std::find_if(world.models.begin(), world.models.end(), [&](const auto& each) {

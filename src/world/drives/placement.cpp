@@ -175,7 +175,7 @@ struct Room::Index {
   std::vector<int> planes, large;                        // indices into solids
   std::unordered_map<uint64_t, std::vector<int>> cells;  // what is found there is sorted
   std::unordered_map<const Geometry*, Box> boxes;        // looked up only
-  std::map<int, TriangleGrid> triangles;                 // of the solids requested so far
+  std::map<int, TriangleGrid> triangles;                 // of the solids requested until now
 
   static int64_t cell_of(double at) { return rounded_down(std::clamp(at, -1e7, 1e7) / kCell_m); }
   static Cells cells_of(const Box& box) {

@@ -14,8 +14,8 @@ namespace ruedo::world {
 // The current pose of a link of an instance, by their indices; empty: as in the world file.
 using LinkPose = std::function<Pose(InstanceIndex instance, ModelLinkIndex link)>;
 
-// What stands where in a world. A query costs only what is near the place, so that thousands of
-// models can be placed one after another. Not thread-safe.
+// The occupied space of a world. A query's cost depends only on things near the place, so that
+// thousands of models can be placed one after another. Not thread-safe.
 class Room {
  public:
   Room();
@@ -25,8 +25,8 @@ class Room {
   void add(const ModelInstance& instance);  // for an instance at its start pose
 
   // The height of the ground at (x, y), m: the highest static surface at most 0.5 m above the
-  // lowest one there, so that ramps and steps count, but tables, walls and roofs do not. 0 if there
-  // is none. near_z: prefers a surface at most 0.5 m from it.
+  // lowest one there, so that ramps and steps count, but tables, walls and roofs do not. 0
+  // without one. near_z: prefers a surface at most 0.5 m from it.
   double ground_height(double x, double y, std::optional<double> near_z = {}) const;
 
   // The same on the storey of a person whose origin is at z, somewhere between feet and hips. If

@@ -143,8 +143,8 @@ std::string written(const Element& element, const std::string& indent) {
   return text + "\n" + indent + "</" + element.name + ">";
 }
 
-// Before SDF 1.5 axes were in the model's frame, since then in the joint's. What was meant is said
-// by each axis, so that the text means the same in a file of the other kind.
+// Before SDF 1.5 axes were in the model's frame, since then in the joint's. Each axis gets its
+// frame explicitly, so that the text means the same in a file of the other kind.
 void say_frames_of_axes(const std::string& text, const Element& element, const TextElement& place,
                         bool in_model, TextPatch& patch) {
   for (size_t i = 0; i < element.children.size(); ++i) {
@@ -251,7 +251,7 @@ WorldText::WorldText(std::string text, const WorldModel& first)
 
 void WorldText::match(const WorldModel& first) {
   const ResourceFinder resources(first.file, true);
-  std::map<std::string, std::string> files;  // by the addresses looked up so far
+  std::map<std::string, std::string> files;  // by the addresses looked up until now
   const auto file_of = [&](const std::string& uri) {
     const auto [at, fresh] = files.try_emplace(uri);
     if (fresh) at->second = resources.find_model(uri, first.file).value_or("");
@@ -341,7 +341,7 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
   Written result;
   std::map<std::string, const ModelNow*> now;
   for (const ModelNow& model : models) now.emplace(model.name, &model);
-  // What was removed and then restored is taken from the file again.
+  // A model that was removed and then restored comes from the file again.
   const auto own = [&](const ModelNow& model) {
     return model.spawned.empty() || model.spawned == model_text(model.name);
   };

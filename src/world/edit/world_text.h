@@ -1,5 +1,5 @@
-// Writes a world file with models moved, removed and added. What has not changed stays byte for
-// byte as it was written: comments, order, whitespace.
+// Writes a world file with models moved, removed and added. Unchanged parts stay byte for byte as
+// they were written: comments, order, whitespace.
 #pragma once
 
 #include <memory>

@@ -15,7 +15,7 @@ using Vec2 = Eigen::Vector2d;
 
 // Shortest paths to a goal, over cells.
 struct Route {
-  std::vector<float> left;  // remaining path length from each cell, m; infinity: there is no path
+  std::vector<float> left;  // remaining path length from each cell, m; infinity without a path
 };
 
 class FloorPlan {
@@ -38,7 +38,7 @@ class FloorPlan {
 
   // For people of that radius, who keep `clearance` from walls if they can.
   Route route_to(const Rect& goal, double radius, double clearance) const;
-  // Where to head from p: a point on the path that is visible from p; p itself if there is no path.
+  // The next target from p: a point on the path that is visible from p; p itself without a path.
   Vec2 next(const Route& route, const Rect& goal, const Vec2& p, double clearance) const;
 
  private:

@@ -84,7 +84,7 @@ class FlatYaml {
     });
   }
 
-  // Those that are none of map_server's.
+  // Keys that map_server does not have.
   void check_keys(Findings& findings) const {
     const std::vector<std::string> known{"image", "resolution",      "origin",     "negate",
                                          "mode",  "occupied_thresh", "free_thresh"};
@@ -175,7 +175,7 @@ void check_extent(const OccupancyGrid& grid, const Source& source) {
                                "; allowed are walls within 1000000 m of the origin");
 }
 
-// A map may be a stranger's: it reaches the pictures in its own folder and below.
+// A map may be untrusted: it reaches the pictures in its own folder and below.
 std::string picture_of(const FlatYaml& yaml, const std::string& path, bool allow_absolute) {
   const std::string named = yaml.text("image");
   const fs::path folder = fs::absolute(path).parent_path().lexically_normal();
@@ -287,7 +287,7 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
 
 namespace {
 
-// What an ArMap holds, line by line.
+// The contents of an ArMap, line by line.
 class ArMap {
  public:
   ArMap(const std::string& path, double thickness) : path_(path), thickness_(thickness) {

@@ -35,7 +35,7 @@ struct Rect {
   bool has(const Eigen::Vector2d& p) const { return nearest(p) == p; }
 };
 
-// What a horizontal plane at `height` (m, above z = 0) cuts. Leaves out robots and models that move
+// The section of a world at `height` (m, above z = 0). Leaves out robots and models that move
 // along a path, cuts meshes along their outlines, and adds a margin of one metre. Cells lie at
 // multiples of `resolution`. Restricted to `within` if given. Throws InputError for a map of more
 // than 100 million cells.

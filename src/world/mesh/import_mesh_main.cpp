@@ -321,7 +321,7 @@ void write(const MeshPackage& package, int output) {
     throw std::runtime_error(std::string("the result cannot be written: ") + std::strerror(errno));
 }
 
-// What is too large, the limit, and what helps. Allocates nothing: the memory is used up.
+// The excess, the limit, and the remedy. Allocates nothing: the memory is used up.
 void say_too_large(const char* path) {
   struct stat file{};
   if (*path != '\0') ::stat(path, &file);
@@ -344,7 +344,7 @@ int main(int argc, char** argv) {
   }
   try {
     const ruedo::FileHandle output(::dup(STDOUT_FILENO));
-    ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what a library prints is no part of the mesh
+    ::dup2(STDERR_FILENO, STDOUT_FILENO);  // output of libraries is not part of the mesh
     ruedo::Sandbox sandbox;
     sandbox.system = false;
     sandbox.alone = true;

@@ -40,7 +40,7 @@ struct MeshPackage {
   std::vector<MeshDependency> dependencies;
 };
 
-// What of a mesh its convex pieces depend on, packed.
+// The part of a mesh on which its convex pieces depend, packed.
 std::string pack_solid(const Mesh& mesh);
 
 // Two independent 64-bit hashes of the bytes as 32 hexadecimal digits; and one of the two.
@@ -51,7 +51,7 @@ std::string pack_mesh(const MeshPackage& package);
 // Throws std::runtime_error saying what is wrong.
 MeshPackage unpack_mesh(std::string_view bytes);
 
-// What is wrong with the mesh's numbers and indices; "" if nothing is.
+// The error in the mesh's numbers and indices; "" without one.
 std::string mesh_fault(const Mesh& mesh);
 
 // Whether every edge belongs to exactly two triangles, traversed in opposite directions; equal

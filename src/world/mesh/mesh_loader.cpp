@@ -190,7 +190,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
       try {
         MeshPackage package = unpack_mesh(bytes_of(entry, kMostBytes));
         if (dependencies_hold(package, file.parent_path())) return taken(std::move(package), path);
-      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): imported anew, below
+      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): imported again, below
       }
     }
   }
@@ -215,7 +215,7 @@ std::shared_ptr<const Mesh> MeshLoader::divided_or_cached(const Mesh& mesh, size
     if (fs::is_regular_file(entry, error)) {
       try {
         return taken(bytes_of(entry, kMostBytes));
-      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): divided anew, below
+      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): divided again, below
       }
     }
   }

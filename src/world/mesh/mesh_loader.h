@@ -2,7 +2,7 @@
 // read once per load.
 //
 // The child is ruedo-import-mesh. If a malformed file makes it hang, abort or run out of memory,
-// the server goes on without that mesh.
+// the server continues without that mesh.
 #pragma once
 
 #include <map>
@@ -51,13 +51,13 @@ class MeshLoader {
   // Reports the pictures that the materials of a mesh's file name, and that are not there.
   void name_textures_not_found(const Mesh& mesh, Findings& findings) const;
 
-  // The files read so far: meshes, files they refer to, and textures. Includes broken mesh files.
+  // The files read: meshes, files they refer to, and textures. Includes broken mesh files.
   const std::vector<std::string>& files_read() const { return files_; }
 
  private:
   struct Entry {
     std::shared_ptr<const Mesh> mesh;
-    std::string fault;  // why there is no mesh
+    std::string fault;  // the reason of a missing mesh
     std::vector<std::string> textures_not_found = {};
   };
   std::shared_ptr<const Mesh> divided_or_cached(const Mesh& mesh, size_t most) const;

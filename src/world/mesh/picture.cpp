@@ -118,7 +118,7 @@ int64_t picture_pixels(std::span<const uint8_t> span) {
 
 std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   const Size size = size_of(Bytes(span));
-  // For another kind, only its decoder could tell how much memory it needs.
+  // For another kind, only its decoder knows how much memory it needs.
   if (size.width <= 0 || size.height <= 0)
     return "it is not a picture that can be read (pgm, png, jpeg, bmp, tiff)";
   if (size.white != 255 && size.white != 65535)

@@ -8,13 +8,13 @@
 
 namespace ruedo::world {
 
-// What is wrong with the size; "" for a picture of at most `most` pixels in width and height and
+// The error in the size; "" for a picture of at most `most` pixels in width and height and
 // kMostPixelsInAll. Supports PNG, JPEG, BMP, TIFF, PBM, PGM and PPM; everything else is not a
 // picture.
 std::string picture_fault(std::span<const uint8_t> bytes, int64_t most);
 
-// Width times height; 0 for what is no picture, or one with more than kMostPixelsInAll, which
-// nobody decodes.
+// Width times height; 0 if it is not a picture, or has more than kMostPixelsInAll, which are not
+// decoded.
 int64_t picture_pixels(std::span<const uint8_t> bytes);
 
 inline int64_t picture_pixels(const std::string& bytes) {

@@ -20,8 +20,8 @@ class TextureStore {
  public:
   explicit TextureStore(Findings& findings) : findings_(findings) {}
 
-  // The picture in a file, by its path; null, and a finding, where the others leave no room for it.
-  // A file that is no picture costs nothing, and whoever draws finds out.
+  // The picture in a file, by its path; null, and a finding, if the others leave no room for it.
+  // A file that is not a picture costs nothing; the renderer reports it.
   std::shared_ptr<const Texture> take(const std::string& path);
   // The same for a picture that is embedded in the mesh file `owner`.
   std::shared_ptr<const Texture> take(const std::shared_ptr<const Texture>& embedded,

@@ -80,7 +80,7 @@ bool is_drive_wheel(const Model& model, ModelJointIndex joint) {
          in(model.drive->steer_joints);
 }
 
-// What of a model moves as one body, and which links turn with which of its joints. The same for
+// The links of a model that move as one body, and those that turn with its joints. The same for
 // all instances of the model.
 struct Grouping {
   Groups links;
@@ -109,7 +109,7 @@ std::vector<ModelJointIndex> way_up(const Model& model, const Groups& links, Mod
   return way;
 }
 
-// What carries the wheels and the joints that steer them, each perhaps on a suspension.
+// The links that carry the wheels and the joints that steer them, each perhaps on a suspension.
 std::vector<ModelLinkIndex> holders_of(const Model& model) {
   std::vector<ModelLinkIndex> holders;
   for (const auto* joints :
@@ -168,7 +168,7 @@ Grouping group(const Model& model) {
   }
   if (model.drive) {
     result.carrier = carrier_of(model, result.links);
-    if (kinematic) {  // it moves as a whole: its suspension does not give way
+    if (kinematic) {  // it moves as a whole: its suspension is rigid
       for (const ModelLinkIndex each : holders_of(model)) {
         for (const ModelJointIndex j : way_up(model, result.links, each, result.carrier)) join(j);
       }

@@ -53,13 +53,13 @@ struct JointPlacement {  // joints that are neither fixed nor wheels of a drive
 struct RobotPlacement {
   InstanceIndex instance;
   BodyIndex body;                  // that carries base_link; none for a robot that does not move
-  Pose X_BBase;                    // base_link in that body (X_WBase where there is none)
+  Pose X_BBase;                    // base_link in that body (X_WBase without one)
   std::vector<WheelIndex> wheels;  // left ones first, then right, front first, then those that
                                    // steer
   std::vector<JointIndex> joints;
 };
 
-// What ruedo/info lists as a body. Segmentation labels it with its place in that list + 1.
+// A body in ruedo/info. Segmentation labels it with its place in that list + 1.
 struct ListedBody {
   BodyIndex body;  // none: a static link
   LinkIndex link;  // of a body its first

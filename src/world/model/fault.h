@@ -32,7 +32,7 @@ struct FaultKind {
 const std::vector<FaultKind>& fault_kinds();
 const FaultKind* find_fault_kind(const std::string& name);
 
-// What is wrong with it and what is allowed; "": nothing. Does not check that the robot or device
+// The error in it and the allowed values; "": none. Does not check that the robot or device
 // exists.
 std::string check_fault(const Fault& fault);
 

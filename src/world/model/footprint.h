@@ -1,4 +1,4 @@
-// What a model covers of the ground, for planners that move it as a polygon or a circle.
+// The area of the ground below a model, for planners that move it as a polygon or a circle.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// What robots stand on: the level planes of a world, and the lowest points of a robot's wheels.
+// The ground of robots: the level planes of a world, and the lowest points of a robot's wheels.
 #pragma once
 
 #include <optional>
@@ -21,7 +21,7 @@ std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, d
 std::optional<LevelPlane> nearest_plane(const WorldModel& world, const BodyLayout& layout,
                                         double height);
 
-// The lowest friction among the shapes of a robot's wheels; 1 if there are none.
+// The lowest friction among the shapes of a robot's wheels; 1 without one.
 double friction_of_wheels(const WorldModel& world, const BodyLayout& layout, RobotIndex robot);
 
 // Height of the lowest point of a shape at X_FC, along z of F.

@@ -14,7 +14,7 @@
 namespace ruedo::world {
 
 // Each cell between four heights has two triangles, divided along the line from high x and y to low
-// x and y. They are computed when they are asked for: a map of 4097 x 4097 has 33 million, and a
+// x and y. They are computed on demand: a map of 4097 x 4097 has 33 million, and a
 // height takes four bytes.
 class HeightGrid {
  public:

@@ -18,7 +18,7 @@ class LoadsPlugins {
   LoadsPlugins& operator=(const LoadsPlugins&) = delete;
 };
 
-// Loads those of a world's or model's <plugin>s that are named "ruedo" or "ruedo::...". Throws
+// Loads those of a world's or model's <plugin>s with the name "ruedo" or "ruedo::...". Throws
 // InputError.
 void load_own_plugins(const std::vector<const Element*>& plugins);
 

@@ -33,7 +33,7 @@ struct Geometry {
   Vec3 normal = Vec3::UnitZ();  // plane only; the plane goes through the origin and is infinite
   Eigen::Vector2d extent{100, 100};  // plane only: the size that is drawn
   std::shared_ptr<const Mesh> mesh;  // mesh only; polylines and heightmaps are meshes too
-  // Mesh only: convex pieces, a Mesh::Part each, which stand for it in contacts of bodies that
+  // Mesh only: convex pieces, a Mesh::Part each, which replace it in contacts of bodies that
   // move. Null: the convex hulls of its connected parts are near enough, or nothing better is
   // known.
   std::shared_ptr<const Mesh> pieces;
@@ -125,7 +125,7 @@ struct Pid {
   double offset = 0.0;                   // N m or N
 };
 
-// What a joint does before its first command.
+// The state of a joint before its first command.
 struct JointStart {
   enum class Mode { free, stay, position, velocity };  // stay: holds the start position
   Mode mode = Mode::free;
@@ -360,7 +360,7 @@ struct WorldModel {
   Environment environment;
   SolverDescription solver;
   Sky sky;
-  std::optional<Pose> viewpoint;  // from which the file wants to be looked at: x ahead, z up
+  std::optional<Pose> viewpoint;  // the file's own camera: x ahead, z up
   std::vector<Light> lights;
   // in file order, followed by those of --spawn
   IndexedVector<InstanceIndex, ModelInstance> models;

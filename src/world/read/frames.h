@@ -50,7 +50,7 @@ class FrameGraph {
     bool merged = false;                       // its frames are reached by their own names
   };
 
-  // Throws InputError when the name is taken.
+  // Throws InputError if the name exists.
   void add(Node node);
 
   // The pose of a frame in the scope, and the link it moves with. The error for a missing frame or
@@ -81,7 +81,7 @@ class FrameGraph {
   std::vector<Node> nodes_;
   std::vector<State> states_;
   std::vector<Pose> poses_;
-  std::vector<std::optional<ModelLinkIndex>> links_;  // of the frames that were asked about
+  std::vector<std::optional<ModelLinkIndex>> links_;  // of the requested frames
   std::map<std::string, size_t, std::less<>> by_name_;
   std::vector<size_t> merged_;
 };

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int64_t kMostPieces = 64;
 
-// How many convex pieces may stand for a mesh that moves: 1 for its hull.
+// The largest number of convex pieces of a mesh that moves: 1 for its hull.
 size_t most_pieces(const Element& mesh, const std::string& where, ReadContext& context) {
   const std::string* optimization = mesh.attribute("optimization");
   if (optimization && *optimization == "convex_hull") return 1;
@@ -232,8 +232,8 @@ bool is_too_large(const Geometry& g, const Element& element, const std::string& 
   return true;
 }
 
-// Reads the shapes given by a few numbers. Converters write sizes of zero for "no shape": there is
-// none then. Negative sizes are errors.
+// Reads the shapes given by a few numbers. Converters write sizes of zero for "no shape": they give
+// none. Negative sizes are errors.
 class SizedShape {
  public:
   SizedShape(const Element& shape, const std::string& where, Findings& findings)

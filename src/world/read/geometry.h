@@ -9,11 +9,11 @@
 
 namespace ruedo::world {
 
-// What a shape is for. A mesh that collides and moves is divided into convex pieces, as its
+// The use of a shape. A mesh that collides and moves is divided into convex pieces, as its
 // `optimization` says.
 enum class ShapeUse { seen, collides, collides_moving };
 
-// Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
+// Reads <geometry>. nullopt: without a shape, or its mesh is missing or broken; the findings say
 // which. Throws TooLarge for a heightmap that collides and cannot be used: it is the ground.
 std::optional<Geometry> read_geometry(const Element& geometry, const std::string& where,
                                       ReadContext& context, ShapeUse use);

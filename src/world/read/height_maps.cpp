@@ -17,7 +17,7 @@
 namespace ruedo::world {
 namespace {
 
-// Elevations from the lowest (0) to the highest (1). What was not measured is the lowest.
+// Elevations from the lowest (0) to the highest (1). Unmeasured places are the lowest.
 cv::Mat normalized(const cv::Mat& elevation) {
   constexpr float kNoData = -9000.0f;  // m; beyond the deepest sea, by custom
   cv::Mat heights;

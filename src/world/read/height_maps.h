@@ -19,7 +19,7 @@ HeightGrid heightmap(const std::string& picture, const Vec3& size, const Vec3& a
 // The same surface as arrays.
 Mesh triangles_of(const HeightGrid& grid);
 
-// The same, shared by all who have it: a visual and a collision, or copies of a world.
+// The same, shared by all its users: a visual and a collision, or copies of a world.
 std::shared_ptr<const HeightGrid> height_map_of(const std::string& picture, const Vec3& size,
                                                 const Vec3& at);
 

@@ -175,7 +175,7 @@ constexpr OfSensor kOfSensors[] = {
     {"wireless_receiver wireless_transmitter", "transceiver"},
 };
 
-// What may stand in an element more than once. Of everything else the readers take the first.
+// Elements that may occur more than once in a parent. Of all others the readers use the first.
 constexpr std::string_view kSeveral[] = {"actor",
                                          "angle",
                                          "animation",
@@ -351,7 +351,7 @@ class Walk {
     return known && describes && !own;
   }
 
-  // What neither SDF nor Ruedo has may be a plugin's own.
+  // An element that neither SDF nor Ruedo has may be a plugin's own.
   static bool is_once(const Element& element, const std::string& child) {
     const std::vector<std::string> known = words_in(element);
     if (!child.starts_with("ruedo:") && std::find(known.begin(), known.end(), child) == known.end())

@@ -31,8 +31,8 @@ struct ReadContext {
 // "__model__").
 std::string required_name(const Element& element);
 
-// Names an element that is not known, `what`: an error where it is nearly the name of another,
-// for what was meant is missing; else it may be a plugin's own.
+// Reports an unknown element, `what`: an error if it is nearly the name of another, since the
+// intended one is missing; else it may be a plugin's own.
 void report_unknown(const Element& element, const std::string& what, const std::string& near,
                     const std::string& where, Findings& findings);
 
@@ -50,8 +50,8 @@ class TooLarge : public InputError {
 };
 
 // Runs read(). An error in a standard element is reported, `what` ("the shape") is left out, and
-// the result is false. An error in one of Ruedo's own elements is thrown on, and so is that of an
-// option: who wrote it is there to mend it.
+// the result is false. An error in one of Ruedo's own elements is rethrown, and so is that of an
+// option: its author can fix it.
 template <class Read>
 bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings,
                        Read read) {

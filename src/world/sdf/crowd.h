@@ -1,5 +1,5 @@
-// <ruedo:crowd> in <world>: people who walk to goals on their own. This is what the file says; how
-// they walk is in robot/crowd.h.
+// <ruedo:crowd> in <world>: people who walk to goals on their own. This has the file's values; the
+// walking is in robot/crowd.h.
 #pragma once
 
 #include <string>

@@ -19,7 +19,7 @@ std::vector<const Element*> states_of(const Element& parent, const std::string& 
   return list;
 }
 
-// What is left out without a word there changes nothing: times, accelerations, wrenches. Elements
+// Elements that are ignored silently there change nothing: times, accelerations, wrenches. Those
 // of the newer syntax are looked through by name_what_has_no_effect().
 void name_unknown(const Element& element, Findings& findings, const std::string& where) {
   const std::string& of = element.name;

@@ -32,7 +32,7 @@ Eigen::Vector2d two_numbers(const Element& element, double least) {
   return {v[0], v[1]};
 }
 
-// What the elements say, before anything is placed.
+// The values of the elements, before anything is placed.
 struct Fleet {
   const Element& element;
   std::string name, arrangement;

@@ -1,4 +1,4 @@
-// <include>: the file, read once for all who include it, and the changes that the <include> makes.
+// <include>: the file, read once for all its <include>s, and the changes that each one makes.
 #include <algorithm>
 #include <filesystem>
 
@@ -34,7 +34,7 @@ void name_what_else_is_in(const Element& sdf, Findings& findings) {
   }
 }
 
-// What an <include> may say in place of its model.
+// The elements of an <include> that replace those of its model.
 bool is_setting(const Element& child) {
   return child.name == "static" || child.name == "enable_wind" ||
          child.name == "allow_auto_disable" || child.name.rfind("ruedo:", 0) == 0;
@@ -164,7 +164,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
 
 namespace {
 
-// What an <include> changes in the model itself, beyond its pose.
+// The changes of an <include> in the model itself, beyond its pose.
 bool is_override(const Element& child) {
   return is_setting(child) || child.name == "plugin" || child.name == "sensor" ||
          child.name == kParams;

@@ -132,7 +132,7 @@ double moment(const Element& inertia, const char* name, double fallback) {
   return inertia.number(name, fallback, Allowed::any(quantity::kInertia));
 }
 
-// What is wrong with an inertia; "" if a body can have it. A tolerance of a thousandth allows for
+// The error in an inertia; "" if a body can have it. A tolerance of a thousandth allows for
 // rounding.
 std::string inertia_fault(const Inertial& inertial) {
   if (!inertial.inertia.allFinite()) return "a moment of inertia is not a number";
@@ -149,7 +149,7 @@ std::string in_words(const Vec3& size) {
   return rounded(size.x()) + " x " + rounded(size.y()) + " x " + rounded(size.z()) + " m";
 }
 
-// The inertia of a box around the collisions; of a cube of 0.1 m if there are none.
+// The inertia of a box around the collisions; of a cube of 0.1 m without one.
 Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
   Eigen::AlignedBox3d box;
   for (const Collision& c : link.collisions) {

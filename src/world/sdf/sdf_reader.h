@@ -96,8 +96,8 @@ void check_channel_names(const ModelInstance& instance, const Source& source);
 std::string joint_frame(FrameGraph& frames, const std::string& joint);
 std::string beside_link(const std::string& joint);
 
-// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" if there is
-// none.
+// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" without
+// one.
 std::string joint_end(const Element& joint, const char* which);
 
 // Reads <joint>; its frames are those of the model.

@@ -134,7 +134,7 @@ void check_performers(const WorldModel& world, const std::vector<const Element*>
   }
 }
 
-// In Gazebo it takes a plugin as well, which servers may have been told to load for every world.
+// In Gazebo it needs a plugin as well, which a server's configuration may load for every world.
 void name_wind_without_plugin(const Element& element, const WorldModel& world, Findings& findings) {
   const Wind& wind = world.environment.wind;
   if (wind.pushes || wind.velocity == Vec3::Zero()) return;
@@ -445,7 +445,7 @@ class SdfReader::WorldReader {
     std::shared_ptr<const ScopedModel> scope;
   };
 
-  // Those that something is placed by were named there.
+  // Frames by which something is placed were reported there.
   void name_lost_frames() {
     for (const Element* frame : element_.all("frame")) {
       const std::string* name = frame->attribute("name");

@@ -103,7 +103,7 @@ void add_geometry(Element& parent, const urdf::Geometry* geometry, const Source&
   }
 }
 
-// What the <gazebo reference="NAME"> blocks of a link say.
+// The contents of the <gazebo reference="NAME"> blocks of a link.
 struct GazeboLink {
   std::vector<const Element*> sensors;
   std::vector<const Element*> as_written;  // elements of an SDF link, inserted as in Gazebo

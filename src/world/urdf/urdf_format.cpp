@@ -18,7 +18,7 @@ struct Format {
   Words children, attributes;
 };
 
-// What a robot or a link may have more than once. Of everything else urdfdom takes the first.
+// Elements that a robot or a link may have more than once. Of all others urdfdom uses the first.
 constexpr std::string_view kSeveral[] = {"link",         "joint",        "material", "gazebo",
                                          "transmission", "ros2_control", "visual",   "collision"};
 

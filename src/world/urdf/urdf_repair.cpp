@@ -269,7 +269,7 @@ class Repair {
     std::set<const Element*> closing;
     for (const Element* link : robot_.all("link")) {
       const std::string first = name_of(*link);
-      // links, with the number of joints followed so far
+      // links, with the number of joints followed until now
       std::vector<std::pair<std::string, size_t>> way;
       if (states[first] == State::unseen) way.emplace_back(first, 0);
       while (!way.empty()) {

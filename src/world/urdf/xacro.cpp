@@ -78,7 +78,7 @@ std::string last_line(std::string text) {
                                   (why.empty() ? "it does not say why" : why));
 }
 
-// What expand.py prints.
+// The output of expand.py.
 std::string output_of(const std::string& path, std::vector<std::string> words,
                       const ProcessLimits& limits) {
   const std::string python = words[0];

@@ -135,7 +135,7 @@ class Notes:
     """What xacro reads and what it does not find, by wrapping its functions."""
 
     def __init__(self, xacro, file):
-        self.read, self.missing = [], []  # files; (file, what it wants)
+        self.read, self.missing = [], []  # files; (file, the missing one)
         self._xacro, self._file = xacro, file
         self._reading = []  # files that are open, the innermost last
         self._parse, self._include = xacro.parse, xacro.process_include
@@ -191,7 +191,7 @@ def main():
     parser.add_argument("--argument", action="append", default=[])
     arguments = parser.parse_args()
     output = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="surrogateescape")
-    os.dup2(2, 1)  # what xacro prints is no part of the robot
+    os.dup2(2, 1)  # output of xacro is not part of the robot
     try:
         import xacro
     except ImportError:
@@ -215,7 +215,7 @@ def main():
         print(f"read\t{name}", file=output)
     for where, name in dict.fromkeys(notes.missing):
         print(f"missing\t{where}\t{name}", file=output)
-    # What is not found is named as other files have it.
+    # A missing package keeps its name, as in other files.
     robot = document.toxml().replace("file://" + MISSING, MISSING)
     print(f"\n{robot.replace(MISSING + '/', 'package://')}", file=output, flush=True)
     return 0
