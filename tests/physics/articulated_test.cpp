@@ -221,8 +221,6 @@ TEST(Articulated, StopsOfAChainAreSolvedAtOnce) {
   }
 }
 
-// A motor without a maximum that drives into a stop gives nothing there, one that holds a load off
-// it gives what the load needs.
 // Base and pendulum swing about their common centre of mass, which stays where it is.
 TEST(Articulated, APendulumOnAnUprightBaseSwingsWithIt) {
   constexpr double kMass = 1.0, kBase = 2.0, kLength = 0.5, kMoment = 0.01, kStart = 0.02;
