@@ -172,7 +172,7 @@ def test_a_heightmap_that_is_too_large_ends_the_run(tmp_path):
         ),
     ],
 )
-def test_a_run_does_not_go_on_without_its_ground(tmp_path, picture, text):
+def test_a_run_ends_without_its_ground(tmp_path, picture, text):
     world = hills(tmp_path, 33)
     (tmp_path / "hills.png").unlink()
     if picture:

@@ -58,6 +58,6 @@ def test_clients_refuse(language, url):
     assert f"url '{url}': " in text and WRONG[url] in text and "an address looks like" in text
 
 
-def test_a_servers_own_address_is_no_clients(language):
+def test_a_servers_own_address_is_refused(language):
     _, text = said([*PROBES[language], "memq://", "connect"])
     assert text.startswith("failed NoServer: url 'memq://': "), text

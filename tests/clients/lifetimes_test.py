@@ -268,7 +268,7 @@ def test_a_server_whose_queue_is_full_is_there(tmp_path):
 NEVER = 2**63 - 1
 
 
-def test_callbacks_get_the_newest_where_nobody_waits_for_them():
+def test_callbacks_without_pacing_get_the_newest():
     done = run([*JAVA, "ruedo.Internals", "callbacks"])
     assert done.stdout.splitlines() == [
         "newest 100000",

@@ -418,7 +418,7 @@ def test_the_first_view_is_of_what_counts(tmp_path, what):
         browse(process.url, tmp_path, "first_view", given)
 
 
-def test_numbers_of_what_moves_are_no_edits(tmp_path):
+def test_poses_of_moving_models_do_not_count_as_edits(tmp_path):
     with running("--disable", "p3at/camera") as process:
         browse(process.url, tmp_path, "numbers")
 

@@ -261,7 +261,7 @@ TEST_F(LockstepModeTest, AJoiningClientStartsAtTheGrantedStep) {
   EXPECT_EQ(grant(0, 100, 101, 1).code, reply_t::BAD_REQUEST);  // the other one cannot have it
 }
 
-TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {
+TEST_F(LockstepModeTest, RestartsWithARebuiltWorld) {
   begin(1);
   join_all();
   publish(0);

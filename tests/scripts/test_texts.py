@@ -1,4 +1,4 @@
-"""Texts for users keep to plain words: `scripts/texts.py` collects them.
+"""Texts for users keep to plain words: `scripts/texts.py` collects them. So do names of tests.
 
 The phrases below, which readers misunderstood, do not come back.
 """
@@ -34,6 +34,12 @@ RIDDLES = {
     r"\bwhat acts\b": "applies, is used",
 }
 
+TEST = r"^TEST(?:_F|_P)?\(\s*\w+,\s*(\w+)|^ *(?:async )?def (test_\w+)\("
+RIDDLE_OF_A_NAME = re.compile(
+    "^What|(?:^|[a-z])(?:Who|Told|HeldUp|(?:Is|Are)(?:Named|Said))(?![a-z])|Anew$"
+    "|^test_what_|_(?:who|told|held_up|(?:is|are)_(?:named|said))(?:_|$)|_anew$"
+)
+
 
 @pytest.fixture(scope="module")
 def every_text():
@@ -46,6 +52,18 @@ def test_no_text_is_a_riddle(every_text, riddle):
         f"{file}:{line}: {text[:200]}" for file, line, text in every_text if re.search(riddle, text)
     ]
     assert not found, f"say {RIDDLES[riddle]!r}:\n" + "\n".join(found)
+
+
+def test_no_test_has_a_riddle_for_a_name():
+    files = [*(ROOT / "tests").rglob("*.cpp"), *(ROOT / "tests").rglob("*.py")]
+    names = [
+        (file.name, name)
+        for file in files
+        for of_cpp, of_python in re.findall(TEST, file.read_text(encoding="utf-8"), re.MULTILINE)
+        if (name := of_cpp or of_python)
+    ]
+    assert len(names) > 2000
+    assert not [name for name in names if RIDDLE_OF_A_NAME.search(name[1])]
 
 
 @pytest.mark.parametrize(

@@ -251,7 +251,7 @@ TEST_F(Receiving, ReportsThreadsThatUseASample) {
   EXPECT_LT(used(), kNever);
 }
 
-TEST(Progress, ASecondEpochBeginsAnew) {
+TEST(Progress, ASecondEpochRestartsTheReports) {
   Progress progress;
   std::vector<std::string> lines;
   progress.use(1000);  // not reported yet
