@@ -2,8 +2,9 @@
 
     scripts/texts.py [WORD...]        (with words: only the texts that hold one of them)
 
-Texts are errors, warnings, help, docstrings and what the page says. A literal counts that has three
-words or more; neighbouring literals are one text. {} and %s stand where values go.
+Texts are errors, warnings, help, docstrings, documentation of the C++ headers and of Java, and what
+the page says. A literal counts that has three words or more; neighbouring literals are one text. {}
+and %s stand where values go.
 """
 
 import ast
@@ -18,6 +19,7 @@ LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 NEIGHBOURS = re.compile(r'"(?:[^"\\\n]|\\.)*"(?:\s*(?:\+\s*)?"(?:[^"\\\n]|\\.)*")*')
 IN_TYPESCRIPT = re.compile(r'"(?:[^"\\\n]|\\.)*"|`(?:[^`\\]|\\.)*`')
 COMMENT = re.compile(r'"(?:[^"\\\n]|\\.)*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
+DOCUMENTED = re.compile(r"/\*\*(.*?)\*/|((?:///[^\n]*\n?[ \t]*)+)", re.DOTALL)
 Text = tuple[int, str]  # line, text
 
 
@@ -43,6 +45,15 @@ def of_c_family(text: str, pattern: re.Pattern[str] = NEIGHBOURS) -> Iterator[Te
         yield code.count("\n", 0, match.start()) + 1, joined
 
 
+def of_documented(text: str) -> Iterator[Text]:
+    """Literals, and comments of Javadoc and Doxygen."""
+    yield from of_c_family(text)
+    for match in DOCUMENTED.finditer(text):
+        lines = (match.group(1) or match.group(2)).split("\n")
+        said = " ".join(re.sub(r"^\s*(?:\*|///<?)\s?", "", line) for line in lines)
+        yield text.count("\n", 0, match.start()) + 1, said
+
+
 def of_python(text: str) -> Iterator[Text]:
     """Literals and docstrings; of an f-string the parts between its values."""
     outside: list[ast.AST] = [ast.parse(text)]
@@ -61,8 +72,8 @@ def of_python(text: str) -> Iterator[Text]:
 
 READERS = {
     ".cpp": of_c_family,
-    ".h": of_c_family,
-    ".java": of_c_family,
+    ".h": of_documented,
+    ".java": of_documented,
     ".ts": lambda text: of_c_family(text, IN_TYPESCRIPT),
     ".py": of_python,
 }

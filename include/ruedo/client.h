@@ -287,7 +287,7 @@ class MessageStream {
     return decoded(channel(), raw_.next(timeout).bytes);
   }
   /// As Stream::on_sample(). A message of another type is reported on the terminal and skipped.
-  /// @param callback what it throws is reported once on the terminal
+  /// @param callback its exceptions are reported once on the terminal
   /// @return ends the calls when it goes
   /// @throws NoServer
   Subscription on_sample(std::function<void(const Message&)> callback) const {
@@ -571,8 +571,8 @@ class Joint {
   const std::string& name() const { return name_; }  ///< @return as the file has it
   /// @return revolute, continuous, prismatic, ...
   const std::string& kind() const { return kind_; }
-  double lower() const { return lower_; }  ///< @return rad or m; -inf where there is no limit
-  double upper() const { return upper_; }  ///< @return rad or m; +inf where there is no limit
+  double lower() const { return lower_; }                ///< @return rad or m; -inf: no limit
+  double upper() const { return upper_; }                ///< @return rad or m; +inf: no limit
   double max_velocity() const { return max_velocity_; }  ///< @return rad/s or m/s; +inf: no limit
   double max_effort() const { return max_effort_; }      ///< @return N m or N; +inf: no limit
   /// @return false of a joint that mimics another, of a gearbox and of a ball joint
@@ -688,7 +688,7 @@ class Robot {
   Stream<Collisions> collisions() const;
   /// Calls back as Stream::on_sample() does, but only when the robot runs into a body that it did
   /// not touch a moment before.
-  /// @param callback what it throws is reported once on the terminal
+  /// @param callback its exceptions are reported once on the terminal
   /// @return ends the calls when it goes
   /// @throws UnknownName, TypeMismatch, NoServer
   Subscription on_collision(std::function<void(const Collisions&)> callback) const;
@@ -814,7 +814,7 @@ struct SpawnOptions {
 enum class Reset {
   all,   ///< the run continues as a fresh one
   time,  ///< sim time starts at 0 again; nothing moves
-  poses  ///< everything back to where it started, at rest; sim time goes on
+  poses  ///< everything back to where it started, at rest; sim time continues
 };
 
 /// A velocity, linear and angular, in the world.
@@ -910,7 +910,7 @@ class [[nodiscard]] Simulation : public Requests {
   /// Calls back, in the thread of the callbacks, when another server, or the same one restarted,
   /// answers at this address. Commands are not repeated into the new run, and primitives under way
   /// have ended.
-  /// @param callback what it throws is reported once on the terminal
+  /// @param callback its exceptions are reported once on the terminal
   /// @return ends the calls when it goes
   /// @throws NoServer
   Subscription on_new_run(std::function<void()> callback) const;
@@ -1023,7 +1023,7 @@ Simulation connect(const std::string& url = "", const ConnectOptions& options = 
 namespace detail {
 /// The program that is installed with a header of Ruedo.
 /// @param header its path
-/// @return its path; "" where none is
+/// @return its path; "" without one
 std::string program_beside(const std::string& header);
 }  // namespace detail
 

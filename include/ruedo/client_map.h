@@ -13,7 +13,7 @@ namespace ruedo::client {
 /// An occupancy map: cells by rows, the southernmost first; 0 free, 100 occupied, -1 unknown.
 class Map {
  public:
-  /// Where the map lies in the world.
+  /// The pose of the map in the world.
   struct Origin {
     double x = 0.0;        ///< m, of the south-western corner
     double y = 0.0;        ///< m

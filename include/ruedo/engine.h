@@ -175,7 +175,7 @@ class Engine {
   /// @param world the copy
   /// @param channel its name
   /// @param message LCM's encoding
-  /// @throws InputError for a channel that takes none, or bytes that are no such message
+  /// @throws InputError for a channel without commands, or bytes that do not decode
   void command(int world, const std::string& channel, const std::vector<uint8_t>& message);
 
   /// A field of a device, of all robots that have it.

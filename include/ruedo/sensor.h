@@ -35,7 +35,7 @@ class Renderer;
 }  // namespace scene
 class device_info_t;
 
-/// Where the bytes of a sensor's messages go. Buffers are reused: nothing is allocated in the
+/// The buffer of a sensor's messages. Buffers are reused: nothing is allocated in the
 /// steady state.
 class Outbox {
  public:
@@ -155,7 +155,7 @@ class Sensor {
   /// @param other the same device's in another copy of the world
   /// @return false: it cannot; then a world with this device has no snapshots
   virtual bool copy_from(const Sensor& other) { return static_cast<void>(other), false; }
-  /// For snapshots in files: writes what samples to come depend on, or reads it. SensorOf does it
+  /// For snapshots in files: writes the state of later samples, or reads it. SensorOf does it
   /// for a class with a function `void exchange(StateArchive&)`. Not asked of pictures, either.
   /// @param archive that writes or reads
   /// @return false: it cannot; then a snapshot's file leads to the state by running there again

@@ -19,13 +19,13 @@ import java.util.Map;
 
 /**
  * An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT; or unix:///PATH, a local socket, which
- * is none of LCM's.
+ * LCM does not have.
  */
 final class Address {
     private static final String GROUP = "239.255.76.67"; // LCM's own
     static final String DEFAULT_URL = "udpm://" + GROUP + ":7667?ttl=0";
 
-    /** What `ruedo run` serves where there is no multicast route. */
+    /** The address of `ruedo run` without a multicast route. */
     static final String FALLBACK_URL = "tcpq://127.0.0.1:7700";
 
     final String url;
@@ -36,7 +36,7 @@ final class Address {
     final int ttl; // of multicast: networks that datagrams cross
     final int receiveBuffer; // of multicast, in bytes; 0: not named
 
-    /** As the server reads it. Throws NoServer for a text that is no address of a client's. */
+    /** Reads it as the server does. Throws NoServer if the text is not a client's address. */
     Address(String url) {
         this.url = url;
         int at = url.indexOf("://");
@@ -131,7 +131,7 @@ final class Address {
         return found;
     }
 
-    /** From least to most; -1 for what is no such number. */
+    /** A number from least to most; -1 for any other text. */
     private static int number(String digits, int least, int most) {
         if (!digits.matches("[0-9]{1,10}")) return -1;
         long value = Long.parseLong(digits);
@@ -193,7 +193,7 @@ final class Address {
         new StreamSocket(this).close();
     }
 
-    /** False for a tcpq or unix address where nobody listens. */
+    /** False for a tcpq or unix address without a server. */
     boolean isServed() {
         if (multicast) return true;
         try {

@@ -28,7 +28,7 @@ final class Bus implements Transport.Receiver {
     private final ReentrantLock delivering = new ReentrantLock(true); // while handlers are called
     private volatile boolean closed;
 
-    /** What the receiving thread does each time before it waits; returns for how long, ms. */
+    /** The receiving thread calls this before it waits; returns the longest time, ms. */
     volatile LongSupplier beforeTurn = () -> 1000;
 
     /** The one that this thread is in a handler of. */
@@ -88,13 +88,16 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    /** Returns when all handlers of what came have been called. */
+    /** Returns when all handlers of arrived messages have been called. */
     void awaitHandlers() {
         delivering.lock();
         delivering.unlock();
     }
 
-    /** Returns when what waits now was handled, or after a moment: more may come all the time. */
+    /**
+     * Returns when the waiting messages were handled, or after a moment: more may come all the
+     * time.
+     */
     void catchUp() {
         if (handling()) return;
         Deadline deadline = new Deadline(CATCH_UP_SECONDS);
@@ -102,7 +105,7 @@ final class Bus implements Transport.Receiver {
             LockSupport.parkNanos(LOOK_NANOS);
     }
 
-    /** False: what is published now reaches nobody. */
+    /** False: messages published now are lost. */
     boolean isConnected() {
         return transport.isConnected();
     }
@@ -144,7 +147,7 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    /** From now on no handler is called; one that is running goes on. */
+    /** From now on no handler is called; a running one continues. */
     void close() {
         closed = true;
         transport.close();

@@ -17,7 +17,7 @@ final class CallbackFaults {
     private Throwable kept; // these under this object's monitor
     private String keptOn; // what the callback was on
 
-    /** Whether it is kept: false while another one is, or where there is no memory. */
+    /** Whether it is kept: false if another one is, or without memory. */
     boolean keep(Throwable fault, String what) {
         try {
             hook();

@@ -52,7 +52,7 @@ final class CallbackQueue {
         return RUNS.get() != null;
     }
 
-    /** From now on whoever sends waits for the callbacks. */
+    /** From now on senders wait for the callbacks. */
     synchronized void keepAll() {
         mayDrop = false;
     }
@@ -108,7 +108,7 @@ final class CallbackQueue {
                         + " (shown once)");
     }
 
-    /** Until drain() the caller's thread runs what comes, then. */
+    /** Until drain() the caller's thread runs arriving calls. */
     synchronized void borrow() {
         borrowed++;
     }
@@ -159,7 +159,7 @@ final class CallbackQueue {
         }
     }
 
-    /** Nothing runs any more, but for what has begun. */
+    /** Lets no further callback begin. */
     synchronized void close() {
         closed = true;
         waiting.clear();
@@ -167,8 +167,8 @@ final class CallbackQueue {
     }
 
     /**
-     * Waits for a callback that is running, which is named when it takes long. At the program's end
-     * it is not waited for any longer: it may be what ended the program.
+     * Waits for a running callback, and reports one that takes long. At the program's end it waits
+     * no longer: the callback may have ended the program.
      */
     void awaitCallback() {
         if (returned()) return;
@@ -176,7 +176,7 @@ final class CallbackQueue {
         while (!ProgramEnd.hasBegun() && !returned()) {} // which waits
     }
 
-    /** Once; who waits with others goes on after it was said. */
+    /** Once; a thread that waits with others continues after the report. */
     private synchronized void tellOfCallback() {
         if (longTold) return;
         longTold = true;

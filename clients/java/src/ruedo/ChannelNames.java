@@ -67,7 +67,7 @@ final class ChannelNames {
     }
 
     /**
-     * In that state. Where the info from before it was lost, the next name of the channel; ""
+     * The channel's name in that state. If the info from before it was lost, its next name; ""
      * without one.
      */
     String of(int channel) {

@@ -52,12 +52,12 @@ final class Clock {
         }
     }
 
-    /** No message of this run is so far yet: it was false. */
+    /** Whether the time is too far ahead of this run's messages to be right. */
     boolean isFarAhead(long time) {
         return time - MOST_AHEAD_MICROS > utime;
     }
 
-    /** A tick came: what another message said of a time long after it was false. */
+    /** A tick came: a time of another message long after it was wrong. */
     void noteTick(long now) {
         if (now < utime - MOST_AHEAD_MICROS) reset(Math.max(now, 0));
         note(now);
@@ -96,7 +96,7 @@ final class Clock {
         }
     }
 
-    /** Those who sleep check at once. */
+    /** Sleeping threads check at once. */
     synchronized void wake() {
         notifyAll();
     }

@@ -31,7 +31,7 @@ final class Conversions {
         Sample decode(WireReader in) throws IOException;
     }
 
-    /** How a body of a reply is read. */
+    /** Reads the body of a reply. */
     interface Reader<T> {
         T read(WireReader in) throws IOException;
     }
@@ -43,7 +43,7 @@ final class Conversions {
         return Decoders.ALL.get(type);
     }
 
-    /** Of the messages with that fingerprint; null for a type that this library does not know. */
+    /** The conversion of messages with that fingerprint; null for an unknown type. */
     static Conversion of(long fingerprint) {
         for (Conversion conversion : Decoders.ALL.values()) {
             if (conversion.fingerprint == fingerprint) return conversion;

@@ -43,13 +43,13 @@ final class Driver {
         sim.keepRepeating(this);
     }
 
-    /** What is held, and the newest primitive where no status has shown it: by real time. */
+    /** Repeats the held command, and the newest primitive until a status shows it, by real time. */
     synchronized void repeat() {
         if (held != null) sim.bus.publish(heldChannel, held);
         else if (!motions.isEmpty()) sendIfDue(motions.get(motions.size() - 1));
     }
 
-    /** What is held, by sim time. */
+    /** Repeats the held command, by sim time. */
     synchronized void repeatAt(long utime) {
         if (held == null || (utime >= heldAt && utime - heldAt < 1000 * periodMillis())) return;
         heldAt = utime;
@@ -99,7 +99,7 @@ final class Driver {
         for (Motion motion : motions) motion.beginEpoch();
     }
 
-    /** Its robot, or its run, is gone: nothing is repeated to the next one of that name. */
+    /** Stops when the robot or the run is gone: the next robot of that name gets no commands. */
     void end(String reason) {
         List<Motion> underWay;
         List<Subscription> listening = new ArrayList<>();

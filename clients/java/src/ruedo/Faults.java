@@ -1,6 +1,6 @@
 package ruedo;
 
-/** Tells people of what was thrown in a thread that has to live. */
+/** Prints an exception in a thread that must continue. */
 final class Faults {
     private Faults() {}
 

@@ -32,7 +32,7 @@ final class FragmentPool {
         return held;
     }
 
-    /** Leaves what is not in use to the garbage collector; false where there is nothing. */
+    /** Leaves unused memory to the garbage collector; false if there is nothing to free. */
     boolean shrink() {
         long before = held;
         spare.forEach((length, arrays) -> held -= (long) arrays.size() * (length + BESIDE));

@@ -10,10 +10,10 @@ public final class Joint {
     /** "revolute", "continuous", "prismatic", ... */
     public final String kind;
 
-    /** rad or m; -inf where there is no limit. */
+    /** rad or m; -inf: no limit. */
     public final double lower;
 
-    /** rad or m; +inf where there is no limit. */
+    /** rad or m; +inf: no limit. */
     public final double upper;
 
     /** rad/s or m/s; +inf: no limit. */

@@ -3,12 +3,12 @@ package ruedo;
 import java.io.IOException;
 import java.util.function.BooleanSupplier;
 
-/** Repeats its work until that is over, whatever it throws: memory that ran out is there again. */
+/** Repeats its work until that is over, whatever it throws: exhausted memory may be free again. */
 final class LastingThread extends Thread {
     private static final long PAUSE_MILLIS = 10; // after a fault, which may last
 
     interface Work {
-        /** What is lost by an IOException is not worth telling. */
+        /** A loss by an IOException needs no report. */
         void run() throws IOException, InterruptedException;
     }
 

@@ -5,7 +5,7 @@ import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
 
-/** How a private server is started. Every setter returns this. */
+/** Options of a private server. Every setter returns this. */
 public final class LaunchOptions {
     Long seed;
     double rate = 1.0;

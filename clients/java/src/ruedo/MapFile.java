@@ -154,7 +154,7 @@ final class MapFile {
                         + "': expected three numbers: x, y and heading");
     }
 
-    /** Of a PGM of 8 bits, by rows from the top. */
+    /** The pixels of a PGM of 8 bits, by rows from the top. */
     private static byte[][] pixels(Path path) {
         byte[] content = content(path, MOST_PICTURE);
         if (content.length < 2 || content[0] != 'P' || content[1] != '5')

@@ -98,8 +98,8 @@ public final class Motion {
     /**
      * Waits until it is done, at most timeout seconds of real time.
      *
-     * @throws RuedoException.MotionError when it ended early or was refused
-     * @throws RuedoException.Timeout when it still runs; the robot goes on then
+     * @throws RuedoException.MotionError if it ended early or was refused
+     * @throws RuedoException.Timeout if it still runs; the robot continues then
      * @throws RuedoException.RunEnded when the run has
      */
     public Motion await(double timeout) {

@@ -3,7 +3,7 @@ package ruedo;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
 
-/** The end of the program: what it waits for, and whether it has begun. */
+/** The end of the program: the work that it waits for, and whether it has begun. */
 final class ProgramEnd {
     private static final Set<Thread> HOOKS = ConcurrentHashMap.newKeySet();
 

@@ -17,7 +17,7 @@ import java.util.function.Consumer;
 final class Progress {
     private static final long NEVER = Long.MAX_VALUE;
 
-    /** A thread that was given a sample so long ago is not waited for: it does something else. */
+    /** The run does not wait for a thread that got a sample so long ago: it does something else. */
     private static final long PATIENCE_NANOS = 500_000_000;
 
     /** Stands for the thread that will first ask for something, however long that takes. */
@@ -36,7 +36,7 @@ final class Progress {
             this.utime = utime;
         }
 
-        /** Meanwhile the run goes on as in real time; in whole ms, or each call had a line. */
+        /** Meanwhile the run advances as in real time; in whole ms, or each call had a line. */
         long now(long nanoTime) {
             return utime + (nanoTime - since) / 1_000_000 * 1000;
         }
@@ -50,7 +50,7 @@ final class Progress {
     private String told = "";
     private long toldAt;
 
-    /** The line with which a program begins that has received nothing yet. */
+    /** The progress line of a program that has received nothing yet. */
     static String first() {
         return line(0, 0, NEVER);
     }
@@ -85,7 +85,7 @@ final class Progress {
         }
     }
 
-    /** The caller's thread works with what is known at that sim time. */
+    /** The caller's thread uses samples of that sim time. */
     void use(long utime) {
         if (tell != null) use(utime, List.of(Thread.currentThread()));
     }
@@ -101,7 +101,7 @@ final class Progress {
         }
     }
 
-    /** The caller's thread waits for what the server sends. */
+    /** The caller's thread waits for messages of the server. */
     void waits() {
         endUses(Arrays.asList(NOT_YET_KNOWN, Thread.currentThread()));
     }
@@ -118,7 +118,7 @@ final class Progress {
         }
     }
 
-    /** Says it again, where a thread works. False: none does. */
+    /** Reports it again, if a thread works. False if none does. */
     boolean goOn() {
         if (tell == null) return false;
         synchronized (this) {
@@ -128,7 +128,7 @@ final class Progress {
         }
     }
 
-    /** A message came: the server runs, and so it reads what this program tells it. */
+    /** A message came: the server runs, and reads this program's reports. */
     void heard() {
         boolean wasFull = unheard > MOST_UNHEARD;
         unheard = 0;

@@ -74,7 +74,7 @@ public class Reader<T extends Sample> implements Iterable<T> {
     }
 
     /**
-     * How many samples there were between those that this reader got: newer ones had come, or they
+     * The number of samples between those that this reader got: newer ones had arrived, or they
      * were lost on the way.
      */
     public long dropped() {

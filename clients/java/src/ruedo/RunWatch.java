@@ -18,7 +18,7 @@ final class RunWatch {
     private long otherId;
     private int returns;
 
-    /** say: called once for each run of the client's, with the id of one that goes on beside it. */
+    /** say: called once for each run of the client, with the id of a run beside it. */
     RunWatch(LongConsumer say) {
         this.say = say;
     }

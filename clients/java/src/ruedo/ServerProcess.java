@@ -148,7 +148,7 @@ final class ServerProcess {
         if (said.compareAndSet(false, true)) System.err.println(line);
     }
 
-    /** How far this client has come. Not from two threads at once. */
+    /** Reports this client's progress. Not from two threads at once. */
     void tell(String line) {
         try {
             process.getOutputStream().write(line.getBytes(StandardCharsets.US_ASCII));
@@ -158,7 +158,7 @@ final class ServerProcess {
         }
     }
 
-    /** What the server has warned of since the last call, each once. */
+    /** The server's warnings since the last call, each once. */
     synchronized List<String> warnings() {
         List<String> news = new ArrayList<>();
         if (output == null) return news;

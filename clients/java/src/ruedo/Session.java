@@ -241,7 +241,7 @@ final class Session {
         }
     }
 
-    /** For grants, which are not answered by replies. Under this object's monitor. */
+    /** For grants, which have no replies. Under this object's monitor. */
     long nextSequence() {
         return sequence.incrementAndGet();
     }
@@ -258,7 +258,7 @@ final class Session {
         publish(kind, toSession, number, body, -1);
     }
 
-    /** Nothing any more, once this leaves: its answer would be an error. */
+    /** Sends nothing once this leaves: the reply would be an error. */
     void publish(int kind, long toSession, long number, byte[] body, int epoch) {
         if (!leaving.get()) send(kind, toSession, number, body, epoch);
     }
@@ -305,7 +305,7 @@ final class Session {
         throw new RuedoException.RequestError(text, reply.code);
     }
 
-    /** What a reply says; type is the name of the body's. Throws TypeMismatch. */
+    /** The content of a reply; type is the name of the body's. Throws TypeMismatch. */
     static <T> T body(reply_t reply, String type, long fingerprint, Conversions.Reader<T> reader) {
         try {
             WireReader in = new WireReader(reply.body);

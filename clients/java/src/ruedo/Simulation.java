@@ -210,7 +210,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         }
     }
 
-    /** A robot's joint limits: asked for once, and again where the world has changed. */
+    /** A robot's joint limits: requested once, and again when the world has changed. */
     JointLimits limitsOf(String robot) {
         robotInfo(robot);
         return info().jointLimits.computeIfAbsent(robot, this::jointLimits);
@@ -356,7 +356,7 @@ public final class Simulation extends Requests implements AutoCloseable {
 
     /** The parts that a reset resets. */
     public enum Reset {
-        /** What follows equals a fresh run. */
+        /** The run continues as a fresh one. */
         ALL,
         /** Sim time alone. */
         TIME,
@@ -569,7 +569,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return true;
     }
 
-    /** For certain; one that is looked for in vain just now has, too. */
+    /** For certain; one that cannot be found now has, too. */
     boolean serverHasEnded() {
         return (server != null && server.ended() != null) || !bus.isConnected();
     }
@@ -611,12 +611,12 @@ public final class Simulation extends Requests implements AutoCloseable {
         return ids.incrementAndGet();
     }
 
-    /** This thread works with what is known now. A callback is waited for anyway. */
+    /** This thread uses the current samples. The run waits for callbacks anyway. */
     void noteUse() {
         if (!isCalledBack()) progress.use(clock.utime());
     }
 
-    /** A motion ended then, and this thread knows: next() of any stream gives nothing older. */
+    /** A motion ended then, and this thread knows: next() of any stream returns nothing older. */
     void beginAfter(long utime) {
         ends.set(utime);
     }
@@ -643,7 +643,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
     }
 
-    /** Throws what one of them threw. */
+    /** Rethrows an exception of one of them. */
     void checkCallbacks() {
         if (!isCalledBack()) faults.rethrow();
     }
@@ -686,7 +686,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return there;
     }
 
-    /** The server's last word. */
+    /** The server's last message. */
     void noteEnd(String text) {
         over = text + ", at " + url;
     }
@@ -740,7 +740,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         Thread.sleep(period);
     }
 
-    /** The samples of a channel; made on first use. conversion: null where there is none. */
+    /** The samples of a channel; made on first use. conversion: null if the type has none. */
     @SuppressWarnings("unchecked")
     <T extends Sample> StreamCore<T> core(
             channel_info_t channel, Conversions.Conversion conversion) {
@@ -859,15 +859,13 @@ public final class Simulation extends Requests implements AutoCloseable {
         }
     }
 
-    /** What was sent up to that time has come. */
+    /** All messages up to that time have arrived. */
     private void noteProgress(int epoch, long utime) {
         if (callbacks.isIdle()) progress.received(epoch, utime);
         else callbacks.put(() -> progress.received(epoch, utime));
     }
 
-    /**
-     * Prints what the launched server has warned of, and tells it again how far this program is.
-     */
+    /** Prints the launched server's warnings, and reports this program's progress again. */
     private long beforeTurn() {
         if (server != null && System.nanoTime() - listenedAt >= LISTEN_NANOS) {
             listenedAt = System.nanoTime();
@@ -893,7 +891,7 @@ public final class Simulation extends Requests implements AutoCloseable {
         return isOver && mayTakeOver;
     }
 
-    /** What comes may be of the next run, of which there is no info yet. The receiving thread's. */
+    /** Messages may be of the next run, whose info is still missing. For the receiving thread. */
     boolean inDoubt() {
         return watch.inDoubt();
     }

@@ -3,7 +3,7 @@ package ruedo;
 import java.util.Locale;
 import java.util.function.Supplier;
 
-/** Whether sim time goes on while a call waits for it, and why it may not; in its thread. */
+/** Whether sim time advances while a call waits for it, and if not, why; in its thread. */
 final class Standstill {
     private static final double LONG_SECONDS = 5.0; // of real time
     private static final double STANDS_SECONDS = 1.0;
@@ -24,7 +24,7 @@ final class Standstill {
         utime = clock.utime();
     }
 
-    /** Says so, once, when it has stood still for 5 s. */
+    /** Warns once when it has stood still for 5 s. */
     void look() {
         double seconds = standsFor();
         if (told || seconds < LONG_SECONDS) return;
@@ -41,7 +41,7 @@ final class Standstill {
                         reason));
     }
 
-    /** Why the call has waited in vain; "": sim time goes on. */
+    /** The reason why the call has waited in vain; "": sim time advances. */
     String reason() {
         return standsFor() >= STANDS_SECONDS || since == began ? why.get() : "";
     }

@@ -110,7 +110,7 @@ final class Stepper {
         this.session = session;
     }
 
-    /** Its caller runs the callbacks of what came, before it returns. */
+    /** Its caller runs the callbacks of arrived messages, before it returns. */
     Observations step(long n, List<Command> commands, double timeout) {
         if (n < 0) throw new IllegalArgumentException("n is " + n + ": it must be at least 0");
         for (Command command : commands) {
@@ -166,7 +166,7 @@ final class Stepper {
         }
     }
 
-    /** For whose grant the run waits, as far as this client knows. */
+    /** The clients whose grants the run waits for, as far as this client knows. */
     synchronized String whoseTurn() {
         String name = session.name();
         if (!part) {
@@ -234,7 +234,7 @@ final class Stepper {
         }
     }
 
-    /** At the state that stands, for who joins later and grants nothing. */
+    /** Reads the current state, for a client that joins later and grants nothing. */
     private void look(double timeout) {
         name_request_t body = new name_request_t();
         body.name = "";
@@ -364,8 +364,8 @@ final class Stepper {
     }
 
     /**
-     * Of what stands between this client and the next step some may not be the server's: all of it
-     * is asked for anew.
+     * Some of the messages since the last complete step may not be the server's: all are requested
+     * again.
      */
     private void doubt() {
         forgetSteps();
@@ -373,7 +373,7 @@ final class Stepper {
         taken = grantBody.length == 0;
     }
 
-    /** Those that are not here; they are asked for. */
+    /** Forgets incomplete steps, which are requested again. */
     private void forgetSteps() {
         steps.tailMap(have, false).clear();
         listed = 0;
@@ -550,7 +550,7 @@ final class Stepper {
         notifyAll();
     }
 
-    /** A message of a step; it may have come before the tick that names it. */
+    /** A message of a step; it may have come before the tick that lists it. */
     private Entry readEntry(WireReader in) throws IOException {
         Entry entry = new Entry();
         entry.channel = in.int32();
@@ -590,7 +590,7 @@ final class Stepper {
         if (have >= wantedUntil || have - acknowledged >= ACKNOWLEDGED_TOGETHER) notifyAll();
     }
 
-    /** To GRANT or RESEND. */
+    /** Handles a reply to GRANT or RESEND. */
     synchronized void onReply(reply_t reply) {
         if (!part) return;
         boolean granting = reply.kind == request_t.GRANT;

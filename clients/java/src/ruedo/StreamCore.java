@@ -31,7 +31,7 @@ final class StreamCore<T extends Sample> {
     private static final long MOST_KEPT_BYTES = 4 << 20;
     private static final int MOST_DEPTH = 1000;
 
-    /** How far a reader has come. */
+    /** The progress of a reader. */
     static final class Place {
         private long seen; // of the samples of the stream, the last that a call has returned
         private long skipped;
@@ -105,7 +105,7 @@ final class StreamCore<T extends Sample> {
         return subscription;
     }
 
-    /** In the receiving thread, for what is this package's own. */
+    /** In the receiving thread, for this package's own use. */
     Subscription onArrival(Consumer<? super T> callback) {
         return add(arrivals, callback, null);
     }
@@ -139,7 +139,7 @@ final class StreamCore<T extends Sample> {
         }
     }
 
-    /** Its robot is gone. */
+    /** Stops when the robot is gone. */
     void end() {
         Subscription ended;
         synchronized (this) {
@@ -149,7 +149,7 @@ final class StreamCore<T extends Sample> {
         if (ended != null) ended.close();
     }
 
-    /** What came is of a run that has ended. */
+    /** Forgets the samples of a run that has ended. */
     synchronized void forget() {
         newest = null;
         fault = null;
@@ -243,7 +243,7 @@ final class StreamCore<T extends Sample> {
         return kept.isEmpty() ? 0 : kept.getFirst().utime;
     }
 
-    /** Of that moment; null: it is before what is kept. */
+    /** The sample of that time; null if it is older than the kept ones. */
     T at(long utime, double timeout) {
         if (!hasTime)
             throw new RuedoException.NotSupported(
@@ -273,13 +273,13 @@ final class StreamCore<T extends Sample> {
         return utime - before.utime < after.utime - utime ? before : after;
     }
 
-    /** Whatever came, the receiving thread lives. */
+    /** Keeps the error for the readers: the receiving thread continues. */
     private synchronized void fail(RuedoException error) {
         fault = error;
         notifyAll();
     }
 
-    /** How many samples are missing since the last one. */
+    /** The number of samples lost since the last one. */
     private long lostBefore(long utime) {
         long last = lastUtime;
         lastUtime = utime;
@@ -335,7 +335,7 @@ final class StreamCore<T extends Sample> {
         }
     }
 
-    /** What the reader gets; null: that has not come yet. */
+    /** The reader's sample; null if it has not arrived yet. */
     private Arrival found(Place reader, boolean newOne, long notBefore) {
         if (!newOne) return newest;
         Arrival oldest = null;

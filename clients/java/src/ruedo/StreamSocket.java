@@ -35,7 +35,7 @@ final class StreamSocket implements Closeable {
     private final Selector looks = Selector.open(); // of hasInput(), for any thread
     private volatile long readMillis; // 0: without end
 
-    /** Throws IOException when nobody serves there. */
+    /** Throws IOException if no server is there. */
     StreamSocket(Address address) throws IOException {
         channel = address.path != null ? local(address) : SocketChannel.open();
         try {
@@ -128,7 +128,7 @@ final class StreamSocket implements Closeable {
         looks.close();
     }
 
-    /** A connection; a server whose queue is full, as of one that is stopped, is waited for. */
+    /** A connection; waits for a server whose queue is full, as that of a stopped one. */
     private static SocketChannel local(Address address) throws IOException {
         Deadline deadline = new Deadline(SENDING_MILLIS * 1e-3);
         for (; ; ) {

@@ -8,8 +8,7 @@ import java.nio.file.Path;
 import java.util.concurrent.atomic.AtomicInteger;
 
 /**
- * The pipe by which `ruedo regress` is told how far the client that it launched is
- * (docs/protocol.md).
+ * The pipe that reports the progress of a launched client to `ruedo regress` (docs/protocol.md).
  */
 final class ToRegression {
     private static final AtomicInteger connections = new AtomicInteger();
@@ -23,7 +22,7 @@ final class ToRegression {
         tell(Progress.first());
     }
 
-    /** The regression that launched this program, if that is its address; null: there is none. */
+    /** The regression at that address that launched this program, or null. */
     static ToRegression at(String url) {
         String descriptor = System.getenv("RUEDO_PROGRESS");
         if (descriptor == null || !url.equals(System.getenv("LCM_DEFAULT_URL"))) return null;

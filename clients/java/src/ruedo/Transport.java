@@ -1,6 +1,6 @@
 package ruedo;
 
-/** What carries messages. Thread safe, also within the receiver. */
+/** A transport of messages. Thread safe, also within the receiver. */
 interface Transport {
     /**
      * Called by the transport's own thread, one message at a time. What it throws does not end that
@@ -10,7 +10,7 @@ interface Transport {
         /** Whether anybody listens to that channel; otherwise its messages are skipped. */
         boolean wants(String channel);
 
-        /** Before the thread waits; for how long it may, ms. */
+        /** Called before the thread waits; returns the longest time to wait, ms. */
         long beforeTurn();
 
         /** message: all of its bytes, the receiver's from now on. */
@@ -31,7 +31,7 @@ interface Transport {
 
     void unsubscribe(String channel);
 
-    /** What cannot be sent is lost, as any datagram may be; unanswered requests are repeated. */
+    /** A datagram that cannot be sent is lost, as any may be; unanswered requests are repeated. */
     void publish(String channel, byte[] message);
 
     /** Whether a message waits for the receiver, or it has not seen all of one yet. */

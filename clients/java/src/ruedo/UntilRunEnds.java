@@ -4,7 +4,7 @@ import java.util.Iterator;
 import java.util.NoSuchElementException;
 import java.util.function.Supplier;
 
-/** What a call returns, again and again; ends where the call throws RunEnded. */
+/** Iterates over a call's results; ends when the call throws RunEnded. */
 final class UntilRunEnds<T> implements Iterator<T> {
     private final Supplier<T> call;
     private T next; // null: it is not there yet

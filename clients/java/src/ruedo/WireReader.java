@@ -27,7 +27,7 @@ final class WireReader {
         bytes = ByteBuffer.wrap(message);
     }
 
-    /** The whole message, whatever was read of it. */
+    /** The whole message, whichever part was read. */
     byte[] whole() {
         return bytes.array();
     }
@@ -87,7 +87,7 @@ final class WireReader {
         return n;
     }
 
-    /** Where an array does not have so many elements. */
+    /** For an array with another number of elements. */
     static void checkProduct(int size, int rows, int columns) throws IOException {
         if (rows < 0 || columns < 0 || (long) rows * columns != size)
             throw new IOException("sizes that do not fit each other");
@@ -107,7 +107,7 @@ final class WireReader {
         return text;
     }
 
-    /** A string that is printed; '?' stands for each control character but line ends and tabs. */
+    /** A string that is printed; '?' replaces each control character but line ends and tabs. */
     String text() throws IOException {
         return printed(string());
     }

@@ -28,7 +28,7 @@ final class WorldInfo {
     private final Map<String, Map<String, channel_info_t>> deviceChannels = new HashMap<>();
     private final Map<String, channel_info_t> outputs = new HashMap<>(); // by name
 
-    /** Of the robots that were asked for. */
+    /** Of the requested robots. */
     final Map<String, JointLimits> jointLimits = new ConcurrentHashMap<>();
 
     private WorldInfo(List<world_info_t> parts) {
@@ -67,17 +67,17 @@ final class WorldInfo {
         return channels.getOrDefault(robot, List.of());
     }
 
-    /** What the server sends by that name; null: nothing. */
+    /** The channel of that name from the server, or null. */
     channel_info_t output(String name) {
         return outputs.get(name);
     }
 
-    /** The first that carries a device's samples; null: none does. */
+    /** The first channel of a device's samples, or null. */
     channel_info_t channelOf(String robot, String device) {
         return deviceChannels.getOrDefault(robot, Map.of()).get(device);
     }
 
-    /** Of a world_info_t; null where it is none that this client reads. */
+    /** Decodes a world_info_t; null if this client cannot read it. */
     static Long runIdOf(byte[] message) {
         if (message.length < Assembler.HEAD) return null;
         ByteBuffer head = ByteBuffer.wrap(message);
@@ -237,7 +237,7 @@ final class WorldInfo {
             return new WorldInfo(decoded);
         }
 
-        /** What is not whole yet waits in memory. */
+        /** Incomplete parts wait in memory. */
         private void checkSize(int nparts) {
             long size = 0;
             for (byte[] part : parts.values()) size += part.length;
