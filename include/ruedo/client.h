@@ -674,10 +674,10 @@ class Robot {
   Device<ForceTorque> force_torque() const;   ///< @return the force-torque sensor
   Device<LogicalCamera> logical_camera() const;  ///< @return the logical camera
   Camera camera() const;                         ///< @return the camera
-  Device<Boxes2D> boxes_2d() const;  ///< @return the camera that boxes what is in its picture
-  Device<Boxes3D> boxes_3d() const;  ///< @return the camera that boxes what is before it
-  Device<Imu> imu() const;           ///< @return the inertial unit
-  Device<Contact> contact() const;   ///< @return the bumper
+  Device<Boxes2D> boxes_2d() const;              ///< @return the camera of boxes in its picture
+  Device<Boxes3D> boxes_3d() const;              ///< @return the camera of boxes in space
+  Device<Imu> imu() const;                       ///< @return the inertial unit
+  Device<Contact> contact() const;               ///< @return the bumper
   /// @}
   /// @param name of a camera ("left")
   /// @return the camera, with its depth, labels and intrinsics
@@ -705,10 +705,10 @@ class Robot {
   /// @return its limits, its state and its commands
   /// @throws UnknownName, which lists the joints; NoServer
   [[nodiscard]] Joint joint(const std::string& name) const;
-  /// Commands joints by their names: `{{"shoulder", 0.5}, {"elbow", -0.3}}`. Each holds what it was
-  /// commanded until its next command; no watchdog ends that.
+  /// Commands joints by their names: `{{"shoulder", 0.5}, {"elbow", -0.3}}`. Each holds its
+  /// command until the next one; no watchdog ends it.
   /// @param values rad or m, rad/s or m/s, N m or N; positions are kept within the joint's limits
-  /// @param mode what they are
+  /// @param mode the kind of the values
   /// @throws UnknownName, which lists the joints; std::invalid_argument for what is not finite;
   /// NotSupported for a joint that takes no commands, and in lockstep; NoServer
   void command_joints(const std::map<std::string, double>& values,
@@ -783,7 +783,7 @@ class Robot {
   /// @return the command
   [[nodiscard]] Command wheel_command(double left, double right) const;
   /// @param values as command_joints() takes them
-  /// @param mode what they are
+  /// @param mode the kind of the values
   /// @return the command
   [[nodiscard]] Command joint_command(const std::map<std::string, double>& values,
                                       JointMode mode = JointMode::position) const;
@@ -932,7 +932,7 @@ class [[nodiscard]] Simulation : public Requests {
   /// @throws LeaseLost if the other clients continued without this one; Timeout
   Observations step(int64_t n = 1, const std::vector<Command>& commands = {},
                     Duration timeout = 60.0) const;
-  /// @param what is reset
+  /// @param what the parts to reset
   /// @param seed of the new epoch; -1: the same again
   void reset(Reset what = Reset::all, int64_t seed = -1) const;
   /// @param model one that comes with Ruedo, or a file the server finds
@@ -975,9 +975,9 @@ class [[nodiscard]] Simulation : public Requests {
   void quit() const;
   /// @}
 
-  /// Draws for people to see, in the web console and in the log.
-  /// @param layer a name of your own; what is drawn takes the place of all that was in it
-  /// @param markers what is drawn; none empties the layer
+  /// Draws in the world; the web console and the log show it.
+  /// @param layer a name of your own; the markers replace all earlier ones of the layer
+  /// @param markers the drawing; none empties the layer
   /// @param frame a robot, with whose base_link it moves; "": the world
   /// @throws std::invalid_argument for more than a message holds; NoServer
   void markers(const std::string& layer, const std::vector<Marker>& markers = {},
@@ -1086,10 +1086,10 @@ class Log {
   /// @return their names, sorted
   [[nodiscard]] std::vector<std::string> channels() const;
   /// @param channel its name
-  /// @return how many messages it has; 0 for one that the log has not
+  /// @return the number of its messages; 0 if the log does not have it
   [[nodiscard]] size_t count(const std::string& channel) const;
-  /// @return "" where the file ends properly; else how it was cut off or is damaged, and at which
-  /// byte: what came before that is here
+  /// @return "" if the file ends properly; else its truncation or damage, and at which byte: the
+  /// messages before that are readable
   [[nodiscard]] const std::string& fault() const;
 
   /// The samples on a channel, in order: `log.samples<Scan>("p3at/lrf")`; RawSample has the bytes

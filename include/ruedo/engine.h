@@ -153,10 +153,10 @@ class Engine {
   [[nodiscard]] double step_size() const;
   /// @return the robots with a drive, in the order of the world file: the second axis of commands
   [[nodiscard]] const std::vector<std::string>& robots() const;
-  /// @return what observe() takes fields of
+  /// @return the devices whose fields observe() reads
   [[nodiscard]] std::vector<EngineDevice> devices() const;
-  /// @return what of the world file is not supported, or was repaired: file, line, element, what
-  /// was done
+  /// @return the unsupported and the repaired elements of the world file: file, line, element, and
+  /// the effect
   [[nodiscard]] const std::vector<std::string>& findings() const;
 
   /// Computes n states of every copy.
@@ -190,17 +190,17 @@ class Engine {
   void reset(int world, uint64_t seed);
   void reset();  ///< with the seeds that they have
 
-  /// A copy as it stands, with all that decides what follows, and with what was commanded already.
+  /// The whole state of a copy, with the commands that are under way.
   /// It costs about as much as a reset, however long the copy has run.
   /// @param world the copy
   /// @throws InputError for a plugin's sensor or drive that cannot be copied
-  /// @return what restore() takes
+  /// @return for restore()
   [[nodiscard]] SavedWorld save(int world = 0);
-  /// Makes copies what save() gave: for the same commands, what follows is what followed there,
-  /// byte for byte. They have its seed from then on.
+  /// Restores a state of save() in copies: with the same commands they continue as the saved one
+  /// did, byte for byte. They have its seed from then on.
   /// @param saved by this engine
   /// @param worlds the copies; none: the one that was saved
-  /// @throws InputError for what another engine saved
+  /// @throws InputError for a state of another engine
   void restore(const SavedWorld& saved, const std::vector<int>& worlds = {});
 
   /// @param world the copy

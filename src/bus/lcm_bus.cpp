@@ -255,7 +255,7 @@ void LcmBus::look_for_loss() {
   told_lost_ = lost_;
   next_warning_ = now + kBetweenWarnings;
   spdlog::warn(
-      "{} datagrams to {} were lost on this machine so far: who listens did not take them "
+      "{} datagrams to {} were lost on this machine: a listener did not read them "
       "in time, and the receive buffer was full; {}",
       lost_, url_.str(), cure_of_datagram_loss());
 }

@@ -30,11 +30,11 @@ constexpr size_t kMessages_bytes = size_t{64} << 10;
 class MemoryFile {
  public:
   explicit MemoryFile(const char* name) : file_(::memfd_create(name, MFD_CLOEXEC)) {
-    if (!file_) fail("no memory for what another program writes");
+    if (!file_) fail("no memory for the output of another program");
   }
   MemoryFile(const char* name, std::string_view content) : MemoryFile(name) {
     if (write_all(get(), content.data(), content.size()) != content.size())
-      fail("no memory for what another program reads");
+      fail("no memory for the input of another program");
     ::lseek(get(), 0, SEEK_SET);
   }
   int get() const { return file_.get(); }

@@ -401,7 +401,7 @@ def test_a_full_temporary_folder_is_not_blamed_on_the_controller(tmp_path, way):
     )
     assert done.returncode == 4 and done.stderr.count("\n") == 1, (done.stdout, done.stderr)
     assert done.stderr.endswith(
-        "No space left on device; what was run so far is kept: make room, and resume\n"
+        "No space left on device; finished cases are kept: make room, and resume\n"
     )
     assert "1 of 1 cases: 1 passed" in ruedo("campaign", "resume", "c.yaml", folder=tmp_path).stdout
 

@@ -124,8 +124,8 @@ def test_a_lost_head_node_is_one_line_and_loses_nothing(whole, cluster):
     assert driver.returncode == 4
     (line,) = said.splitlines()
     assert re.match(
-        "ruedo: the Ray cluster was lost: its head node [0-9.:]+ does not answer; what was run is "
-        "kept, `ruedo campaign resume` does the rest",
+        "ruedo: the Ray cluster was lost: its head node [0-9.:]+ does not answer; finished cases are "
+        "kept, `ruedo campaign resume` runs the others",
         line,
     )
     assert 1 <= results_in(out) <= 2

@@ -285,7 +285,7 @@ def test_a_second_driver_is_refused(whole):
         )
 
 
-KEPT = "; what was run is kept, `ruedo campaign resume` does the rest"
+KEPT = "; finished cases are kept, `ruedo campaign resume` runs the others"
 
 
 @pytest.mark.parametrize(
@@ -300,7 +300,7 @@ KEPT = "; what was run is kept, `ruedo campaign resume` does the rest"
 )
 def test_ending_a_campaign_leaves_nothing_behind(words, told, hang, kept, folder):
     """Neither processes, of its controllers' either, nor folders, whether or not the workers hang;
-    what was run is kept. Or a hunt, which keeps nothing.
+    finished cases are kept. Or a hunt, which keeps nothing.
     """
     temporary = folder / "temporary"
     temporary.mkdir()

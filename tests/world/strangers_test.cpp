@@ -173,7 +173,7 @@ TEST(Names, ThatTwoModelsShareAreFound) {
   name_shared_paths(world, findings);
   ASSERT_EQ(findings.list().size(), 2u);
   EXPECT_EQ(findings.list()[0].text,
-            "'x/y/z' is a link of the model 'x/y', too; who asks for it gets one of both");
+            "'x/y/z' is a link of the model 'x/y', too; a request for it reads one of the two");
 }
 
 TEST(Strangers, TextsHaveNoFolder) {

@@ -1,7 +1,7 @@
 """A stream of samples from one channel: the latest, the next, or each as it comes.
 
-The receiving thread keeps the newest message as it came. It is decoded by who asks for it, and in
-the thread of the callbacks.
+The receiving thread keeps the newest message undecoded. Readers decode it, and so does the thread
+of the callbacks.
 """
 
 from __future__ import annotations

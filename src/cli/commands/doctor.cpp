@@ -100,9 +100,9 @@ void check_loss(Report& report, const bus::LcmUrl& url) {
                   loss->of_machine);
   if (loss->at_port == 0)
     return report.good("datagrams",
-                       all + fmt::format("; none by who listens on port {} now", url.port));
+                       all + fmt::format("; none by the listeners on port {} now", url.port));
   report.hint("datagrams", all +
-                               fmt::format("; who listens on port {} now may have lost some "
+                               fmt::format("; the listeners on port {} now may have lost some "
                                            "({} were dropped or filtered there): ",
                                            url.port, loss->at_port) +
                                bus::cure_of_datagram_loss());

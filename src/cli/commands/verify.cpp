@@ -77,7 +77,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   }
   if (!result.fault.empty() && !arguments.partial) {
     fmt::print(
-        "{}: not verified to the end: {}; what is there repeats: {} (--partial is for logs that "
+        "{}: not verified to the end: {}; the rest repeats: {} (--partial is for logs that "
         "are known to be cut)\n",
         one_line(arguments.log), one_line(result.fault), one_line(so_far));
     return kCheckFailed;

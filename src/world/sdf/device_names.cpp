@@ -97,8 +97,8 @@ void name_shared_paths(const WorldModel& world, Findings& findings) {
       if (above == by_name.end()) continue;
       if (const std::string path = shared_path(*above->second, each); !path.empty())
         findings.error(each.model->source, "model " + each.name,
-                       "'" + path + "' is a link of the model '" + above->first + "', too; who " +
-                           "asks for it gets one of both");
+                       "'" + path + "' is a link of the model '" + above->first + "', too; a " +
+                           "request for it reads one of the two");
     }
   }
 }

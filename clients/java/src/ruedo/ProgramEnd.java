@@ -35,7 +35,7 @@ final class ProgramEnd {
         return false;
     }
 
-    /** In one of these threads, until the others have ended. */
+    /** Called in one of the end's threads: waits until the others have ended. */
     static void awaitOthers(long mostMillis) {
         Deadline deadline = new Deadline(mostMillis * 1e-3);
         for (Thread hook : HOOKS) {

@@ -14,9 +14,9 @@ import java.util.function.BooleanSupplier;
 import java.util.function.Consumer;
 
 /**
- * The samples of a channel, decoded in one way: all streams of it share them, whatever ruedo/info
- * said of the channel when each was made. The receiving thread keeps the newest message as it came;
- * it is decoded by who asks for it, and in the thread of the callbacks. Thread safe.
+ * The samples of a channel, decoded in one way: all streams of it share them, also those from an
+ * earlier ruedo/info. The receiving thread keeps the newest message undecoded; readers decode it,
+ * and so does the thread of the callbacks. Thread safe.
  *
  * @param <T> kind of sample
  */

@@ -312,9 +312,9 @@ class Unchanged:
                 changed = True
             if changed:
                 raise CampaignError(
-                    f"{file} was changed while its cases ran; what was run before is kept, "
-                    "`ruedo campaign resume` does the rest with what it is now; where a controller "
-                    "writes it, say in `files` which files it is made of"
+                    f"{file} was changed while its cases ran; earlier results are kept, "
+                    "`ruedo campaign resume` runs the others with the new content; if a controller "
+                    "writes it, list in `files` the files that it is made of"
                 )
             self._touched[file] = touched
 

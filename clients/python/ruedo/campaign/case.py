@@ -75,7 +75,7 @@ class Runner:
         except OSError as error:
             raise CampaignError(
                 f"{error.filename or _scratch(everything, what) or tempfile.gettempdir()}: "
-                f"{error.strerror}; what was run so far is kept: make room, and resume"
+                f"{error.strerror}; finished cases are kept: make room, and resume"
             ) from None
         outcome.time_s = outcome.metrics.get("time_s", 0.0)
         return outcome

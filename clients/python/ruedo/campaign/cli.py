@@ -174,7 +174,7 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
 
     for name in ("run", "resume"):
         one = add(name, _run, "run all cases that have no result yet")
-        one.set_defaults(kept="; what was run is kept, `ruedo campaign resume` does the rest")
+        one.set_defaults(kept="; finished cases are kept, `ruedo campaign resume` runs the others")
         _add_execution(one)
     add("status", _status, "how far it is, and how it goes").add_argument(
         "--json", action="store_true"

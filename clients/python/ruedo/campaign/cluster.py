@@ -53,8 +53,8 @@ def run_on_ray(
                 ray.shutdown()
     if lost:
         raise CampaignError(
-            f"the Ray cluster was lost: {lost}; what was run is kept, `ruedo campaign resume` does "
-            "the rest"
+            f"the Ray cluster was lost: {lost}; finished cases are kept, `ruedo campaign resume` runs "
+            "the others"
         )
 
 

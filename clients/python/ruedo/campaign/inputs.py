@@ -102,7 +102,7 @@ def hash_of(files: dict[str, str]) -> str:
 
 
 def is_read(file: str) -> bool:
-    """Whether it is a program or settings by its name, which no case writes."""
+    """Whether the file is an input by its name: a program or settings, which cases do not write."""
     return _READ.fullmatch(os.path.basename(file)) is not None
 
 

@@ -62,7 +62,7 @@ def _load(what: dict[str, Any], robot: str = "", **options: Any) -> None:
 
 
 def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
-    """It does not differ from itself, if it is a log and its rules are some."""
+    """Checks the golden log and its rules: a log that is compared with itself must not differ."""
     if "golden" not in expect:
         return
     golden = str(folder / expect["golden"])

@@ -213,7 +213,7 @@ class Store:
             part.rename(self.log(id))
         except OSError as error:
             raise CampaignError(
-                f"{self.log(id)}: {error.strerror}; what was run so far is kept: make room, and resume"
+                f"{self.log(id)}: {error.strerror}; finished cases are kept: make room, and resume"
             ) from None
 
     def _write(self, statement: str, values: tuple[Any, ...]) -> None:
@@ -221,7 +221,7 @@ class Store:
             self._db.execute(statement, values)
         except sqlite3.Error as error:
             raise CampaignError(
-                f"{self.folder / 'results.sqlite'}: {error}; what was run so far is kept: make room, and resume"
+                f"{self.folder / 'results.sqlite'}: {error}; finished cases are kept: make room, and resume"
             ) from None
 
 
