@@ -296,6 +296,8 @@ TEST(Articulated, ALightTipBearsTheBarBehindIt) {
   EXPECT_NEAR(w.position("m/l9").z(), 0.1 - 0.9 * sine, 1e-6);
 }
 
+// A motor without a maximum that drives into a stop gives nothing there, one that holds a load off
+// it gives what the load needs.
 TEST(Articulated, AMotorAtAStopGivesTheNeededEffort) {
   const auto arm = [](const std::string& limit) {
     return "<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
