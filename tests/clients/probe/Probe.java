@@ -685,13 +685,14 @@ public final class Probe {
 
     /** What another client of this process, or of the same name, has under way is not its own. */
     private static void apart(String url, String name) throws InterruptedException {
-        for (String what : List.of("unnamed", "driver")) {
+        for (int i = 0; i < 8; i++) {
+            String what = i % 2 == 0 ? "unnamed" : "driver";
             try (Simulation first = joined(url, what)) {
                 Motion running = first.robot(name).advance(5.0, new Limits(0.05, 0.0, 0.0));
                 // Done: lost on the way.
                 while (running.progress() == 0.0 && !running.done()) Thread.sleep(10);
                 try (Simulation second = joined(url, what)) {
-                    attempt(what, () -> second.robot(name).advance(0.1).await(PATIENCE));
+                    attempt(what, () -> second.robot(name).advance(0.02).await(PATIENCE));
                     attempt("first_" + what, () -> running.await(PATIENCE));
                 }
             }

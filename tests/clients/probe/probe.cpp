@@ -638,14 +638,15 @@ void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
 
 // Primitives of another client of this process, or of the same name, are not its own.
 void apart(const std::string& url, const std::string& name) {
-  for (const std::string own : {"", "driver"}) {
+  for (int i = 0; i < 8; ++i) {
+    const std::string own = i % 2 == 0 ? "" : "driver";
     const std::string what = own.empty() ? "unnamed" : own;
     const rc::Simulation first = rc::connect(url, {.name = own, .timeout = 60.0});
     const rc::Motion running = first.robot(name).advance(5.0, {.speed = 0.05});
     while (running.progress() == 0.0 && !running.done())  // done: lost on the way
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     const rc::Simulation second = rc::connect(url, {.name = own, .timeout = 60.0});
-    report(what, [&] { second.robot(name).advance(0.1).wait(kPatience); });
+    report(what, [&] { second.robot(name).advance(0.02).wait(kPatience); });
     report("first_" + what, [&] { running.wait(kPatience); });
   }
 }

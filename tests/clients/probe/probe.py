@@ -515,10 +515,10 @@ def apart(url, name):
         while running.progress == 0.0 and not running.done:  # done: lost on the way
             time.sleep(0.01)
         with ruedo.connect(url, timeout=60.0, name=own) as second:
-            attempt(own or "unnamed", second.robot(name).advance(0.1).wait)
+            attempt(own or "unnamed", second.robot(name).advance(0.02).wait)
         attempt(f"first_{own or 'unnamed'}", running.wait)
 
-    for own in (None, "driver"):
+    for own in 4 * (None, "driver"):
         with ruedo.connect(url, timeout=60.0, name=own) as first:
             advance(own, first.robot(name))
 
