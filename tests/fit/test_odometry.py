@@ -91,6 +91,21 @@ def test_standing_robot():
         fit_odometry([recording], Geometry("differential", 0.05, 0.2))
 
 
+@pytest.mark.parametrize(
+    ("column", "factor", "said"),
+    [
+        (slice(0, 2), 1000, "the path moves [4-9][0-9][0-9] times as far"),  # mm
+        (2, 180 / np.pi, "allowed are m and rad"),  # degrees
+        (slice(0, 3), 0.0, "e-[0-9]+ times as far"),  # a path that stands
+    ],
+)
+def test_other_units(column, factor, said):
+    recording = noiseless("differential", (0.05, 0.05, 0.2))
+    recording.truth.pose[:, column] *= factor
+    with pytest.raises(FitError, match=said):
+        fit_odometry([recording], Geometry("differential", 0.05, 0.2))
+
+
 def test_other_clock():
     recording = noiseless("differential", (0.05, 0.05, 0.2))
     recording.wheels.time += 1e9

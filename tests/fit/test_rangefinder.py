@@ -63,6 +63,14 @@ def test_known_truth_of_ruedo(tmp_path):
     assert "good" in ruedo("check", out)[0]
 
 
+def test_scans_without_any_return(tmp_path):
+    log = tmp_path / "nothing.log"
+    poses = [(0.2 * k, 0, 0) for k in range(9)]
+    log.write_text("".join(flaser([80.0] * 181, pose, k) for k, pose in enumerate(poses)))
+    with pytest.raises(FitError, match="no reading lies on a surface that other scans saw"):
+        fit_rangefinder([read(log)], np.zeros(3))
+
+
 def test_one_place_is_too_little(tmp_path):
     log = tmp_path / "room.log"
     log.write_text("".join(flaser(room_scan((0, 0, 0)), (0, 0, 0), t) for t in range(9)))

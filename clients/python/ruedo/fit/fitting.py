@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as File
 from typing import Any
@@ -20,6 +20,7 @@ from .estimate import Estimate, normal
 from .mapping import own_mount
 from .motion import fit_motion
 from .odometry import OdometryFit, fit_odometry
+from .progress import track
 from .rangefinder import BeamModel, fit_rangefinder
 from .recording import Array, Geometry, Recording, body_steps
 from .robot_file import Setting, write_fitted
@@ -123,16 +124,14 @@ def fit(
     answer = Fit(list(recordings))
     for one in recordings:
         answer.remarks += [f"{one.file}: {finding}" for finding in one.findings]
-    _fit_drive(answer, robot)
-    if any(one.scans is not None for one in recordings):
-        _fit_scans(answer, robot, mount)
-    if motion := fit_motion(recordings[0]):
-        answer.parts["Motion"] = motion
-        _motion_settings(answer, motion)
-    if timing := fit_timing(recordings):
-        answer.parts["Timing"] = timing
-    if recordings[0].imu is not None:
-        answer.parts["IMU"] = fit_imu(recordings[0])
+    stages: list[Callable[[], None]] = [
+        lambda: _fit_drive(answer, robot),
+        lambda: _fit_scans(answer, robot, mount),
+        lambda: _fit_motion(answer),
+        lambda: _fit_streams(answer),
+    ]
+    for stage in track(stages, "fitting"):
+        stage()
     if not answer.parts:
         raise FitError("; ".join(answer.remarks))
     return answer
@@ -161,7 +160,9 @@ def _fit_drive(answer: Fit, robot: Robot | None) -> None:
 
 
 def _fit_scans(answer: Fit, robot: Robot | None, mount: Sequence[float] | None) -> None:
-    recording = next(one for one in answer.recordings if one.scans is not None)
+    recording = next((one for one in answer.recordings if one.scans is not None), None)
+    if recording is None:
+        return
     assert recording.scans is not None
     device = None if robot is None else rangefinder_of(robot, recording.scans.ranges.shape[1])
     place = mount_on(recording, robot) if mount is None else np.asarray(mount, float)
@@ -241,7 +242,18 @@ def believed_measures(recording: Recording, geometry: Geometry) -> Array:
     return np.array([*ahead, track])
 
 
-def _motion_settings(answer: Fit, motion: list[Estimate]) -> None:
+def _fit_streams(answer: Fit) -> None:
+    if timing := fit_timing(answer.recordings):
+        answer.parts["Timing"] = timing
+    if answer.recordings[0].imu is not None:
+        answer.parts["IMU"] = fit_imu(answer.recordings[0])
+
+
+def _fit_motion(answer: Fit) -> None:
+    motion = fit_motion(answer.recordings[0])
+    if not motion:
+        return
+    answer.parts["Motion"] = motion
     source = f"fitted to {answer.recordings[0].file.name}, 95 %: "
     elements = {
         "speed: acceleration": "acceleration",

@@ -24,6 +24,7 @@ from .recording import Array, Geometry, Recording, body_steps
 
 STEP_M = 0.1  # of the wheels, between two readings that are compared
 _LEAST_STEPS = 20
+_ODD = 3.0  # times; between nominal measures and the path's
 _ROUNDS = 3  # of parameters and variances in turn; they change by far less than their errors then
 _UNSURE = 0.05  # relative std from which on a measure is not determined
 _PLACE = ["tracked point ahead", "tracked point left", "tracked heading"]  # in base_link
@@ -117,10 +118,25 @@ def run_of(recording: Recording, drive: Drive) -> Run:
         middle = middle[: cuts[-1]]
     clock = np.diff(driven[cuts])
     last = cuts[-1]
-    return Run(
+    run = Run(
         body_steps(pose)[:last], steps[:last], middle, cuts[:-1], clock,
         time[: last + 1], pose[: last + 1],
     )  # fmt: skip
+    _check_units(recording, drive, run)
+    return run
+
+
+def _check_units(recording: Recording, drive: Drive, run: Run) -> None:
+    """Raises FitError where the path moves in no way that the nominal wheels could."""
+    left = run.summed(drive.residuals(drive.nominal(), run.moved, run.turned, run.steering))
+    ways = run.summed(run.turned) * drive.geometry.radius_m
+    ratio = float(np.abs(ways - left[:, : drive.wheels]).sum() / np.abs(ways).sum())
+    if not 1 / _ODD < ratio < _ODD:
+        raise FitError(
+            f"{recording.file}: the path moves {ratio:.3g} times as far as wheels of "
+            f"{drive.geometry.radius_m:g} m at {drive.geometry.track_m:g} m turn: allowed are m and "
+            "rad in the log, and nominal measures within a third and three times the true ones"
+        )
 
 
 def base_motion(moved: Array, place: Array) -> Array:

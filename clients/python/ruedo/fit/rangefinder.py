@@ -129,8 +129,8 @@ def _against_lines(
     against the lines through the points of other scans around them; NaN without a line.
     """
     near = surfaces.tree.query_ball_point(ends, WINDOW_M)
-    row = np.repeat(np.arange(len(ends)), [len(one) for one in near])
-    point = np.concatenate([np.asarray(one, np.int64) for one in near])
+    row = np.repeat(np.arange(len(ends)), np.array([len(one) for one in near], np.int64))
+    point = np.concatenate([np.zeros(0, np.int64), *(np.asarray(one, np.int64) for one in near)])
     others = surfaces.scan[point] != scan[row]
     row, point = row[others], point[others]
     x, y = (surfaces.points[point] - ends[row]).T
