@@ -146,9 +146,11 @@ def main(sets, part):
         "| Value | determined | truth within the 95 % interval | median error | 90 % of errors below |"
     )
     print("|---|---|---|---|---|")
+    total, held = 0, 0
     for name, every in rows.items():
         known = [(true, one) for true, one in every if one.value is not None]
         inside = sum(one.low <= true <= one.high for true, one in known)
+        total, held = total + len(known), held + inside
         scale, unit = (1000, "ms") if name.endswith("delay") else (100, "%")
         relative = unit == "%" and not name.endswith("error")
         errors = [abs(one.value - true) / (abs(true) if relative else 1) for true, one in known]
@@ -157,6 +159,7 @@ def main(sets, part):
             f"| {name} | {len(known)} of {len(every)} | {inside} of {len(known)} "
             f"| {middle:.2g} {unit} | {most:.2g} {unit} |"
         )
+    print(f"\nOf all intervals, {held} of {total} ({held / max(total, 1):.0%}) hold the truth.")
 
 
 if __name__ == "__main__":

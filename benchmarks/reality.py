@@ -221,8 +221,8 @@ def laser_rows(folder):
     summary = (
         f"\n\nThe distance is below 0.1 in {sum(one < 0.1 for one in totals)} of {len(totals)} buildings. "
         f"Between {min(shares):.0%} and {max(shares):.0%} of the readings are judged; "
-        f"between {min(seen):.0%} and {max(seen):.0%} could be by any rule of this kind, more than 70 % "
-        f"in {sum(one > 0.7 for one in seen)} buildings."
+        f"between {min(seen):.0%} and {max(seen):.0%} could be by any rule that asks for "
+        f"one reading within 0.15 m, more than 70 % in {sum(one > 0.7 for one in seen)} buildings."
     )
     return head + "\n".join(rows) + summary, plot_to_svg(
         lambda axes: draw_lasers(axes, judged), 7, 5

@@ -18,6 +18,7 @@ from .recording import Array, Path, Recording, body_steps
 _FINE_S = 0.005  # step of the model
 _MOST_S = 60.0  # of the log, where commands change most
 _LEAST_CHANGES = 10
+_LEAST_STD = 1e-3  # of limits, relative: ramps are rounded to steps
 _AXES = (("speed", 0, "m/s"), ("turn rate", 2, "rad/s"))
 # Delay (s), logarithms of acceleration, deceleration (per s) and lag (s).
 _LOW, _HIGH = np.array([0.0, -4.6, -4.6, -6.0]), np.array([0.6, 3.0, 3.0, 0.7])
@@ -150,8 +151,10 @@ def _estimates(name: str, unit: str, x: Array, jacobian: Array, left: Array) -> 
     inflation = (1 + max(alike, 0)) / max(1 - max(alike, 0), 0.05)
     stds = np.sqrt(np.maximum(np.diag(covariance), 0.0) * inflation)
     stds[np.sum(jacobian**2, axis=0) < 1e-9] = np.inf  # nothing follows from these readings
-    within = _FINE_S / np.sqrt(12)  # the model's own times are known so well
-    stds[0], stds[3] = np.hypot(stds[0], within), np.hypot(stds[3], within / np.exp(x[3]))
+    # The model knows times to a step; a robot's commands act, and its speeds hold, for steps, too.
+    within = _FINE_S / np.sqrt(12)
+    stds[0], stds[3] = np.hypot(stds[0], 2 * within), np.hypot(stds[3], within / np.exp(x[3]))
+    stds[1:3] = np.hypot(stds[1:3], _LEAST_STD)
     answer = [
         normal(f"{name}: delay", float(x[0]), float(stds[0]), "s", "with the step of the readings")
     ]

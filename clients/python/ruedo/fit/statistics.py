@@ -120,11 +120,11 @@ class Statistics:
                 part = row.part
                 lines += [
                     part,
-                    f"  {'':26}{'A: 5 %':>9}{'50 %':>9}{'95 %':>9}{'B: 5 %':>9}{'50 %':>9}"
-                    f"{'95 %':>9}{'KS':>8}{'energy':>9}{'count':>16}",
+                    f"  {'':26}{'A: 5 %':>10}{'50 %':>10}{'95 %':>10}{'B: 5 %':>10}{'50 %':>10}"
+                    f"{'95 %':>10}{'KS':>8}{'energy':>9}{'count':>16}",
                 ]
             one = row.as_dict()
-            numbers = "".join(f"{q:9.3g}" for both in one["quantiles"] for q in both)
+            numbers = "".join(f"{q:10.3g}" for both in one["quantiles"] for q in both)
             label = f"{row.name}, {row.unit}"
             lines.append(
                 f"  {label:26}{numbers}{one['kolmogorov_smirnov']:8.3f}"
@@ -307,4 +307,4 @@ def _compare_spectra(
             answer.spectra.append(Spectrum(name, first[name][2], (f, g), (p, q)))
     answer.spectra.sort(key=lambda one: one.name)
     if not answer.spectra:
-        raise FitError("no spectra: the logs have no odometry, path or IMU in common")
+        raise FitError("no spectra: no odometry, path or IMU of 64 readings is in both logs")
