@@ -181,7 +181,7 @@ def test_spectrum_of_a_sine():
     assert hertz[np.argmax(power)] == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_is_missing_is_said(folder, tmp_path):
+def test_missing_data_is_reported(folder, tmp_path):
     table = tmp_path / "path.csv"
     table.write_text("time,x,y,theta\n" + "".join(f"{t},{t / 9},0,0\n" for t in range(99)))
     world = folder / "room.sdf"
