@@ -94,7 +94,13 @@ endif()
 add_library(ruedo::lcm SHARED IMPORTED GLOBAL)
 set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${lcm_library} IMPORTED_SONAME liblcm.so.1
   INTERFACE_INCLUDE_DIRECTORIES ${lcm_wheel}/include)
+# It runs here, whatever processor the library is for.
+set(lcm_gen ${lcm_wheel}/bin/lcm-gen)
+if(CMAKE_CROSSCOMPILING)
+  find_program(RUEDO_LCM_GEN lcm-gen PATHS ${PROJECT_SOURCE_DIR}/.venv/bin REQUIRED)
+  set(lcm_gen ${RUEDO_LCM_GEN})
+endif()
 add_executable(ruedo::lcm-gen IMPORTED GLOBAL)
-set_target_properties(ruedo::lcm-gen PROPERTIES IMPORTED_LOCATION ${lcm_wheel}/bin/lcm-gen)
+set_target_properties(ruedo::lcm-gen PROPERTIES IMPORTED_LOCATION ${lcm_gen})
 include(${lcm_DIR}/lcmUtilities.cmake)    # lcm_wrap_types
 set(LCM_NAMESPACE ruedo::)                 # of the target lcm-gen that it calls

@@ -2,7 +2,13 @@
 
 add_library(ruedo_flags INTERFACE)
 # The same bytes everywhere: no contraction to FMA, no fast math, no -march=native.
-target_compile_options(ruedo_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic)
+set(RUEDO_SAME_BYTES -ffp-contract=off)
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
+  # Eigen names fused multiply-adds where the processor has them, and plain char has no sign.
+  list(APPEND RUEDO_SAME_BYTES -U__ARM_FEATURE_FMA -fsigned-char)
+  target_compile_options(ruedo_flags INTERFACE -Wno-psabi)    # of calls that GCC 9 compiled otherwise
+endif()
+target_compile_options(ruedo_flags INTERFACE ${RUEDO_SAME_BYTES} -Wall -Wextra -Wpedantic)
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
   target_compile_options(ruedo_flags INTERFACE -Wno-maybe-uninitialized)    # it takes a moved std::variant for one that holds all at once
 endif()

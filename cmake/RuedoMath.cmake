@@ -8,7 +8,7 @@ set(RUEDO_MATH_FUNCTIONS acos asin atan atan2 cos exp exp2 expm1 hypot log log10
 set(ruedo_math_folder ${PROJECT_BINARY_DIR}/math)
 file(MAKE_DIRECTORY ${ruedo_math_folder})
 
-file(GLOB RUEDO_MUSL /usr/lib/${CMAKE_SYSTEM_PROCESSOR}-linux-musl/libc.a)
+file(GLOB RUEDO_MUSL ${CMAKE_SYSROOT}/usr/lib/${CMAKE_SYSTEM_PROCESSOR}-linux-musl/libc.a)
 if(NOT RUEDO_MUSL)
   message(FATAL_ERROR "musl's static library was not found (package musl-dev): its sin, cos, ... give the same bytes on every CPU")
 endif()

@@ -35,7 +35,7 @@ target_include_directories(ruedo_plugin
          $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/ruedo/plugin>
          $<INSTALL_INTERFACE:lib/ruedo/include>)
 # The same results in a plugin as in Ruedo; its symbols are hidden; missing symbols are reported when it is linked.
-target_compile_options(ruedo_plugin INTERFACE -ffp-contract=off -fvisibility=hidden)
+target_compile_options(ruedo_plugin INTERFACE ${RUEDO_SAME_BYTES} -fvisibility=hidden)
 target_link_options(ruedo_plugin INTERFACE LINKER:--exclude-libs,ALL LINKER:--no-undefined)
 target_sources(ruedo_plugin INTERFACE $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/cmake/plugin_entry.cpp>
   $<INSTALL_INTERFACE:${CMAKE_INSTALL_DATADIR}/ruedo/plugin_entry.cpp>)

@@ -10,13 +10,17 @@ ruedo_build=$ruedo_root/build/release
 readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
 
 # Packages: "a|b" is the first of them that this distribution has; "?a" is left out where it has none.
-readonly BUILD_PACKAGES=(
-  g++ cmake ninja-build pkg-config ccache python3-venv python3-dev default-jdk-headless ca-certificates iproute2
+# What Ruedo is compiled with and linked to; scripts/sysroot takes these for another architecture.
+readonly BUILD_LIBRARIES=(
   libbullet-dev libtinyxml2-dev liburdfdom-dev libyaml-cpp-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev libssl-dev zlib1g-dev libzstd-dev libseccomp-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev nlohmann-json3-dev cyclonedds-dev
   musl-dev
+)
+readonly BUILD_PACKAGES=(
+  g++ cmake ninja-build pkg-config ccache python3-venv python3-dev default-jdk-headless ca-certificates iproute2
+  "${BUILD_LIBRARIES[@]}"
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables
 # is the firewall that a test runs into; libfaketime sets clocks; debootstrap makes bare systems to try the wheel in; MPFR is the oracle of the elementary functions, and qemu has other processors; ffmpeg makes videos; libabigail compares binary interfaces.
@@ -124,7 +128,8 @@ build_jobs() {
   echo $((cores < by_memory ? cores : by_memory))
 }
 
-# build PRESET [-DNAME=VALUE...]: configures where that is not done with these options yet, then builds.
+# build PRESET [-DNAME=VALUE...]: configures where that is not done with these options yet, then builds; the targets in
+# RUEDO_TARGETS alone, if that is set.
 build() {
   local preset=$1 folder=$ruedo_root/build/$1 options=("${@:2}")
   # Another user's folder, as in a container: what is built is used as it is.
@@ -148,7 +153,9 @@ build() {
     }
   fi
   [[ -e $folder/built ]] || say "building build/$preset (the first time takes some minutes)"
-  local ninja=(ninja -C "$folder" -j "$(build_jobs)")
+  local ninja targets
+  read -ra targets <<<"${RUEDO_TARGETS:-}"
+  ninja=(ninja -C "$folder" -j "$(build_jobs)" "${targets[@]}")
   if [[ -t 2 ]]; then
     "${ninja[@]}" >&2
   else

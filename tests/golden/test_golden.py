@@ -1,6 +1,7 @@
 """The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor with
-one thread and with two, or on the emulated one that RUEDO_PROCESSOR names (of
-`qemu-x86_64 -cpu help`) with two."""
+one thread and with two, or on the emulated one that RUEDO_PROCESSOR names (aarch64, or one of
+`qemu-x86_64 -cpu help`) with two.
+"""
 
 import os
 import subprocess
@@ -9,21 +10,28 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
+SOURCE = HERE.parents[1]
 EXPECTED = dict(
     line.split() for line in (HERE / "hashes.txt").read_text(encoding="ascii").splitlines()
 )
 PROCESSOR = os.environ["RUEDO_PROCESSOR"]
 THREADS = [1, 2] if PROCESSOR == "native" else [2]
+PROGRAM = "tests/golden/golden_runs"
+if PROCESSOR == "aarch64":
+    COMMAND = [SOURCE / "scripts/on_arm64", SOURCE / "build/arm64" / PROGRAM]
+    if not COMMAND[1].exists():
+        pytestmark = pytest.mark.skip("build/arm64 is not there (docs/platforms.md, ARM)")
+else:
+    COMMAND = [Path(os.environ["RUEDO_BINARY_DIR"]) / PROGRAM]
+    if PROCESSOR != "native":
+        COMMAND = ["qemu-x86_64", "-cpu", PROCESSOR, *COMMAND]
 
 
 @pytest.mark.parametrize("threads", THREADS)
 @pytest.mark.parametrize("name", EXPECTED)
 def test_same_bytes(name, threads):
-    emulator = [] if PROCESSOR == "native" else ["qemu-x86_64", "-cpu", PROCESSOR]
-    program = Path(os.environ["RUEDO_BINARY_DIR"]) / "tests/golden/golden_runs"
-    result = subprocess.run(
-        [*emulator, program, "--threads", str(threads), name], capture_output=True, text=True
-    )
+    words = [*COMMAND, "--threads", str(threads), name]
+    result = subprocess.run(words, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
     assert result.stdout.split() == [name, EXPECTED[name]], (
         f"{name} on {PROCESSOR}; if results changed on purpose: target renew-golden-hashes"

@@ -1,0 +1,25 @@
+# A toolchain file: compiles for aarch64 with Debian's cross compiler against the folder that scripts/sysroot makes, and runs what
+# has to be run by qemu's user emulation.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
+file(REAL_PATH ${CMAKE_CURRENT_LIST_DIR}/../build/sysroot-arm64 CMAKE_SYSROOT)
+set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
+set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
+set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64 -L ${CMAKE_SYSROOT})
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+set(ENV{PKG_CONFIG_SYSROOT_DIR} ${CMAKE_SYSROOT})
+set(ENV{PKG_CONFIG_LIBDIR} ${CMAKE_SYSROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${CMAKE_SYSROOT}/usr/share/pkgconfig)
+# Libraries that the system's own need, of which the linker is told nothing.
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-rpath-link,${CMAKE_SYSROOT}/usr/lib/aarch64-linux-gnu:${CMAKE_SYSROOT}/lib/aarch64-linux-gnu")
+set(CMAKE_SHARED_LINKER_FLAGS_INIT ${CMAKE_EXE_LINKER_FLAGS_INIT})
+set(CMAKE_MODULE_LINKER_FLAGS_INIT ${CMAKE_EXE_LINKER_FLAGS_INIT})
+set(lcm_DIR ${CMAKE_SYSROOT}/usr/lib/python3/dist-packages/lib/lcm/cmake)
+# Python's modules: the headers of the other system; the interpreter, which gives the version, is this one's.
+file(GLOB Python_INCLUDE_DIR ${CMAKE_SYSROOT}/usr/include/python3.*)
+get_filename_component(python ${Python_INCLUDE_DIR} NAME)
+string(REGEX REPLACE "python3\\.([0-9]+)" ".cpython-3\\1-aarch64-linux-gnu.so" NB_SUFFIX ${python})
+set(NB_SUFFIX_S .abi3.so)
