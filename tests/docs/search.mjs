@@ -1,4 +1,5 @@
-// Searches the site as a reader does: node search.mjs ADDRESS WORDS, in a folder with playwright-core.
+// Searches the site as a reader does: node search.mjs ADDRESS WORDS, in a folder with
+// playwright-core.
 // In both colour schemes, and after a change of them by the page's button, types the words, follows
 // the first result, and prints a line: scheme, found or not, the address that it leads to. Prints
 // each request to another host. PICTURES is a folder for a picture of each.

@@ -2,8 +2,8 @@
 // difference. Given, from an independent reader of both logs: where the robot is at a moment,
 // the first difference, and the largest distance between the robots.
 export default async function compare({ page, given, seen, until, check, picture }) {
-  // Frames alone do not show it: an empty view is drawn before the page is connected, and requests to
-  // the log are lost until then.
+  // Frames alone do not show it: an empty view is drawn before the page is connected, and requests
+  // to the log are lost until then.
   await until(
     "the world is shown",
     () => window.ruedo?.page.now.playback && window.ruedo.stage.frames > 1,

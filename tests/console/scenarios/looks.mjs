@@ -1,5 +1,5 @@
-// The measurements and exports of the view: coordinates, distances, edges, pictures, videos, and links
-// back to it.
+// The measurements and exports of the view: coordinates, distances, edges, pictures, videos, and
+// links back to it.
 import { readFileSync } from "node:fs";
 
 export default async function looks({ page, until, check, ready, still, onScreen }) {
