@@ -109,7 +109,9 @@ describe("plots", () => {
       expect(low).toBeLessThan(value - 1e-7 * Math.abs(value));
       expect(high).toBeGreaterThan(value + 1e-7 * Math.abs(value));
     }
-    expect(padded(1e-6, 2e-6, 0)).toEqual([0.9e-6, 2.1e-6].map((v) => expect.closeTo(v, 12)));
+    const [low, high] = padded(1e-6, 2e-6, 0);
+    expect(low).toBeCloseTo(0.9e-6, 12);
+    expect(high).toBeCloseTo(2.1e-6, 12);
     expect(padded(1e-6, 2e-6, 0.02)[1]).toBeCloseTo(0.02, 3);
   });
 
