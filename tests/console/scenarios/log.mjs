@@ -101,6 +101,10 @@ export default async function log({ page, given, seen, until, check, picture }) 
     } = window.ruedo;
     link.seek(Math.max(playback.begin, playback.end - 2));
   }); // a long log would take minutes
+  await until("(it is near the end)", () => {
+    const { begin, end, now } = window.ruedo.page.now.playback;
+    return Math.abs(now - Math.max(begin, end - 2)) < 1e-3;
+  });
   await page.keyboard.press(" ");
   await until("it stops at the end", () => {
     const p = window.ruedo.page.now.playback;
