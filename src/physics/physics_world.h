@@ -111,8 +111,8 @@ class PhysicsWorld {
   // Between two steps. `instance` is new at the end of the world and the layout, or was removed and
   // placed again: its bodies are at the layout's poses, at rest.
   void add(InstanceIndex instance);
-  // Removes an instance: its bodies touch nothing and stay where they are. What rested on it wakes
-  // up.
+  // Removes an instance: its bodies touch nothing and stay where they are. Bodies that rested on
+  // it wake up.
   void remove(InstanceIndex instance);
   // Wakes a body and everything that it could touch: before and after it is moved.
   void disturb(BodyIndex body);

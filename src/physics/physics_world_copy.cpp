@@ -96,7 +96,7 @@ void PhysicsWorld::Impl::exchange(StateArchive& archive) {
   for (const BodyIndex i : motions_.indices()) exchange_body(archive, i);
   broadphase_.exchange(archive, &dispatcher_);
 
-  IndexedVector<BodyIndex, std::pair<int, btScalar>> rests;  // what bodies say of their sleep
+  IndexedVector<BodyIndex, std::pair<int, btScalar>> rests;  // the bodies' state of sleep
   for (const BodyIndex i : motions_.indices()) {
     rests.emplace_back(bullet(i).getActivationState(), bullet(i).getDeactivationTime());
     if (archive.reads()) bullet(i).forceActivationState(ACTIVE_TAG);

@@ -18,7 +18,7 @@ namespace ruedo::physics {
 
 namespace {
 
-// What joints connect needs shorter substeps, and so does what touches it. Nothing else: an
+// Jointed bodies need shorter substeps, and so do the bodies that touch them. No others do: an
 // unrelated robot must not change one bit of a stack.
 constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfJoints_us = 1000;
 enum Pace { kCoarse, kFine };
@@ -186,7 +186,7 @@ JointConstraint PhysicsWorld::Impl::make_joint(InstanceIndex instance,
   if (child.valid()) {
     tie(child, parent);
   } else {
-    tie(parent, child);  // what the joint carries is fixed to the world
+    tie(parent, child);  // the joint's child is fixed to the world
   }
   const BodyIndex reference = body_of(joint.gear_reference);
   const bool gears = joint.type == world::JointType::gearbox;
@@ -367,7 +367,7 @@ bool PhysicsWorld::Impl::stirs(BodyIndex body) const {
   return !twist.linear.isZero(0.0) || !twist.angular.isZero(0.0);
 }
 
-// What stirs, and everything that it could reach in this step, through contacts and joints.
+// The bodies that stir, and all that they could reach in this step, through contacts and joints.
 void PhysicsWorld::Impl::find_busy() {
   considered_.clear();
   considered_.swap(busy_);

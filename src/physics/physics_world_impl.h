@@ -46,7 +46,7 @@ struct BodyMotion {
   }
 };
 
-// What may hold two bodies together temporarily; without a second one, the body and the world.
+// A temporary connection of two bodies; without a second one, of the body and the world.
 struct Tie {
   BodyIndex body, other;
   std::unique_ptr<btFixedConstraint> constraint;
@@ -185,8 +185,8 @@ class PhysicsWorld::Impl {
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
   std::vector<btRigidBody*> simulated_[2];  // for each substep length
-  // Bodies that may move in this step, and what they could reach, in order; between two steps those
-  // that the next one considers, in any order. What sleeps together is not among them.
+  // Bodies that may move in this step, and all that they could reach, in order; between two steps
+  // those that the next one considers, in any order. Sleeping islands are not among them.
   std::vector<BodyIndex> busy_;
   std::vector<BodyIndex> considered_, spreading_;  // scratch
   Changes changes_;

@@ -216,8 +216,8 @@ void Newton::pull(Contact& contact, double part) {
   }
 }
 
-// The same as if each row remained in its zone. What multipliers, aims and weights change is small;
-// but it acts on stiff springs, which would leave their zones, and return by the next step.
+// As pull() if each row remained in its zone. New multipliers, aims and weights change little; but
+// they act on stiff springs, which would leave their zones, and return by the next step.
 void Newton::pull_in_zones() {
   for (Bound& bound : bounds_) {
     const double wanted = Newton::wanted(bound, 0.0);

@@ -12,7 +12,7 @@ struct WheelServo {
   double lowest_torque = 0.0, highest_torque = 0.0;  // N m
 };
 
-// What messages can change of a joint: N m s/rad or N s/m; N m or N; rad/s or m/s.
+// The values of a joint that messages can change: N m s/rad or N s/m; N m or N; rad/s or m/s.
 enum class JointSetting { rate_gain, effort, velocity };
 
 }  // namespace ruedo::physics

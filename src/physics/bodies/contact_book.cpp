@@ -91,7 +91,7 @@ void ContactBook::sort(std::vector<Contact>& contacts) {
   std::sort(contacts.begin(), contacts.end(), earlier);
 }
 
-// After the contacts at rest have changed. What touches is near, too.
+// After the contacts at rest have changed. Bodies that touch are near, too.
 void ContactBook::note_resting() {
   resting_touching_.clear();
   resting_near_.clear();

@@ -19,17 +19,17 @@ class ContactBook {
   explicit ContactBook(size_t bodies) { resize(bodies); }
 
   void resize(size_t bodies);
-  // Capacity reserved in advance, so that new contacts do not allocate in the running loop. What is
-  // not used costs address space only.
+  // Capacity reserved in advance, so that new contacts do not allocate in the running loop. Unused
+  // capacity costs address space only.
   size_t room() const { return contacts_.capacity(); }
 
   // Whether the body has a contact at rest.
   bool rests(BodyIndex body) const { return rests_[body]; }
-  // Starts a step of that length (s). rests(contact) tells for those of the last step whether their
-  // bodies rest from now on; with `any_woke` it is also asked for those that rested so far.
+  // Starts a step of that length (s). rests(contact) returns whether the bodies of a contact rest
+  // from now on, for the contacts of the last step; with `any_woke` also for resting contacts.
   template <class Rests>
   void begin(double step_s, bool any_woke, const Rests& rests);
-  // Adds the manifolds' contacts after a substep; the last substep defines what is near.
+  // Adds the manifolds' contacts after a substep; the last substep defines which bodies are near.
   void add(const std::vector<btPersistentManifold*>& manifolds, bool last);
   // Ends the step.
   void finish();

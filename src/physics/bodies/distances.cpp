@@ -18,11 +18,11 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kLow_m = 0.02;   // above base_link's plane: what is lower may carry it
+constexpr double kLow_m = 0.02;   // above base_link's plane: lower shapes may carry the robot
 constexpr double kUpwards = 0.7;  // cosine, from base_link's z axis
 constexpr double kRather = 0.1;   // cosine: a lower floor is below rather than beside
 constexpr double kOnFace_m = 1e-5;
-// Nearer than this, a gap's direction is rounding: it is taken from the shape raised by kLow_m.
+// Nearer than this, a gap's direction is rounding: the shape raised by kLow_m gives the direction.
 constexpr double kTouches_m = 1e-3;
 
 struct Box {
@@ -71,7 +71,7 @@ struct Piece {
   const btConvexShape& convex() const { return static_cast<const btConvexShape&>(*shape); }
 };
 
-// What may carry a robot, in some frame.
+// A surface that may carry a robot, in some frame.
 struct Ground {
   bool any = false;
   btVector3 origin{0, 0, 0}, up{0, 0, 1};  // base_link's plane

@@ -6,11 +6,11 @@
 // exact to 1e-6 m. Of a P3-AT and everything within 1 m, a call takes 20 us in worlds/arena.sdf and
 // worlds/maze.sdf.
 //
-// What carries a robot does not count: a triangle or convex shape whose nearest point is lower than
+// The robot's ground does not count: a triangle or convex shape whose nearest point is lower than
 // 2 cm above base_link's plane and lies below (the direction to the robot is within 45 degrees of
 // base_link's z axis), or on a triangle or side of a box that faces upwards so and is level with
 // that plane or clearly below: the next tile of a floor and the foot of a ramp are no obstacles. A
-// model that is no robot has no base_link: everything counts.
+// model without a drive has no base_link: everything counts.
 #pragma once
 
 #include <limits>
@@ -21,7 +21,7 @@
 
 namespace ruedo::physics {
 
-// Not thread safe. Equal snapshots have equal results, whatever was asked before.
+// Not thread safe. Equal snapshots have equal results, whatever calls came before.
 class Distances {
  public:
   // world and layout must outlive it. Models that are added to them later are not known.

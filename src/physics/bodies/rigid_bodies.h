@@ -65,7 +65,7 @@ class RigidBodies {
  public:
   RigidBodies(const world::WorldModel& world, const world::BodyLayout& layout);
 
-  // Creates what the layout has for a new instance, at the end of the lists.
+  // Creates the bodies and joints of a new instance of the layout, at the end of the lists.
   void append(const world::WorldModel& world, const world::BodyLayout& layout,
               InstanceIndex instance);
 

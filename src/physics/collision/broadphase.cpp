@@ -125,7 +125,7 @@ void Broadphase::find_pairs(Proxy& proxy, btDispatcher* dispatcher) {
   }
 }
 
-// Only moving bodies keep partners: a wall need not know what is near it.
+// Only moving bodies keep partners: a wall needs no list of near bodies.
 void Broadphase::add_pair(Proxy& a, Proxy& b) {
   pairs_.addOverlappingPair(&a, &b);
   a.partners.push_back(&b);

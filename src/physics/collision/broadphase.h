@@ -1,5 +1,5 @@
-// Which bodies are near each other: two trees of bounding boxes, one for what never moves, one for
-// what may.
+// Which bodies are near each other: two trees of bounding boxes, one of bodies that never
+// move, one of the others.
 //
 // Bullet's own btDbvtBroadphase shapes its trees by comparing addresses, and drops pairs a few at a
 // time. Here the pairs follow from the boxes alone, so that a repeated run has the same pairs at
@@ -48,8 +48,8 @@ class Broadphase final : public btBroadphaseInterface {
   bool alone(const btBroadphaseProxy* proxy) const {
     return static_cast<const Proxy*>(proxy)->partners.empty();
   }
-  // How many objects were near one that was looked at, whether they may touch or not: what has been
-  // done so far.
+  // A measure of the work done: how many objects were near a visited one, whether they may touch or
+  // not.
   int64_t looked_at() const { return looked_at_; }
   // Recomputes the pairs of a body after the filter's answer about it, or the static set, has
   // changed. Before an object's proxy is destroyed, the filter must refuse it and its neighbours

@@ -11,7 +11,7 @@
 
 namespace ruedo::physics {
 
-// A shape's margin is taken as a rounding outside its core, as for spheres, capsules and tyres.
+// A shape's margin rounds its core outwards, as for spheres, capsules and tyres.
 struct PlacedShape {
   const btConvexShape& shape;
   const btTransform& X;

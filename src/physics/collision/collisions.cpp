@@ -213,7 +213,7 @@ class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
   btManifoldResult& result_;
 };
 
-// A robot that its drive moves along a plane only touches what it overlaps.
+// A robot that its drive moves along a plane touches only shapes that it overlaps.
 bool moves_along_plane(const btCollisionObjectWrapper& box) {
   const auto* body = btRigidBody::upcast(box.getCollisionObject());
   return body && body->getLinearFactor().z() == 0.0;
@@ -318,7 +318,8 @@ class ConvexOnConvex final : public Pair {
       on_b = on_a - here * n;
       gap = here;
     }
-    // A triangle is part of a surface: what overlaps it rather left that than passed its edge.
+    // A triangle is part of a surface: an overlapping shape left the surface rather than passed the
+    // edge.
     void prefer(const btVector3& n) {
       constexpr btScalar kRather = 2.0;
       const btScalar least = gap;

@@ -1,4 +1,4 @@
-// Recreates what Bullet keeps of a pair's contacts between substeps, in another copy of the world.
+// Recreates Bullet's record of a pair's contacts between substeps, in another copy of the world.
 #pragma once
 
 #include "physics/base/bullet.h"

@@ -285,7 +285,7 @@ bool ContactPoints::meet_later(const Placed& a, const Placed& b, Touch& touch) c
     const btVector3& n = closest.normal;
     if (n.isZero()) return false;
     if (closest.distance <= kMet_m) {
-      // What touches then, where it is now.
+      // The points that touch then, at their present places.
       const auto now = [&](const btVector3& on_b, btScalar gap) {
         const btVector3 b_now = b.X * X_b.invXform(on_b),
                         a_now = a.X * X_a.invXform(on_b + gap * n);

@@ -13,8 +13,8 @@
 
 namespace ruedo::physics {
 
-// What a kinematic drive moves only touches what it overlaps, and keeps Bullet's points while it
-// passes over edges: they are its ground. The world marks it so.
+// A body that a kinematic drive moves touches only shapes that it overlaps, and keeps Bullet's
+// points while it passes over edges: they are its ground. The world marks such bodies.
 inline bool is_driven(const btCollisionObject& object) { return object.getHitFraction() == 0.0; }
 
 class ContactPoints : public btManifoldResult {

@@ -120,7 +120,7 @@ Face local_face(const btCollisionShape& shape, const btVector3& d) {
   return tyre ? of_tyre(*tyre, d) : Face{};
 }
 
-// What of the face lies on that side of a plane.
+// The part of the face on that side of a plane.
 void cut(Face& face, const btVector3& at, const btVector3& inward) {
   const Face whole = face;
   face.count = 0;

@@ -24,7 +24,7 @@ struct Face {
   btVector3 normal() const;  // not unit; zero for an edge
 };
 
-// What lies farthest in that direction (unit, world); X is the shape's pose. Triangles, too.
+// The farthest point in that direction (unit, world); X is the shape's pose. Triangles, too.
 Face face_towards(const btCollisionShape& shape, const btTransform& X, const btVector3& direction);
 
 // The point that lies farthest in that direction (unit, world). Bullet's own rounds a cylinder's
@@ -33,7 +33,7 @@ btVector3 farthest_point(const btConvexShape& shape, const btTransform& X,
                          const btVector3& direction);
 
 // A point of the shape a substep ago: a triangle's corner, or the centre of a moving shape. It
-// tells on which side of a surface the shape is, also when it sank into that in the last substep.
+// shows on which side of a surface the shape is, also when it sank into that in the last substep.
 btVector3 center_before(const btCollisionObjectWrapper& placed, btScalar substep_s);
 
 // Calls `act` with the outward normal of each flat side (unit, world), and of the round side what

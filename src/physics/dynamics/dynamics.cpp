@@ -13,7 +13,7 @@ namespace ruedo::physics {
 namespace {
 
 constexpr size_t kTouchingABody = 8;  // expected maximum
-// What falls asleep has been slow, and within this distance of one place, for 2 s.
+// An island falls asleep after 2 s at low speed and within this distance of one place.
 constexpr btScalar kStays_m = 5e-5, kStays_rad = 5e-5;
 // A motor with a faster target keeps its bodies awake; m/s or rad/s.
 constexpr double kTold = 1e-6;
@@ -36,8 +36,8 @@ bool moves(const btCollisionObject& object) {
          !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
 }
 
-// Bullet counts how long a body is slow. What is slow and moves on does not rest: then the count
-// begins anew, and so does the place, which Bullet's interpolated pose stores.
+// Bullet counts how long a body is slow. A body that moves on slowly does not rest: the count
+// restarts, at a new place, which Bullet's interpolated pose stores.
 bool rests(btRigidBody& body, double substep_s) {
   body.updateDeactivation(substep_s);
   const btTransform &X = body.getWorldTransform(), &before = body.getInterpolationWorldTransform();
@@ -233,7 +233,7 @@ void Dynamics::find_islands() {
 }
 
 void Dynamics::solve(Island& island, double substep_s) {
-  // Movers take part with their velocity, and wake what they touch.
+  // Movers take part with their velocity, and wake the bodies that they touch.
   bool awake = std::any_of(island.bodies.begin(), island.bodies.end(),
                            [](const btRigidBody* body) { return body->isActive(); });
   const size_t own = island.bodies.size();
@@ -256,7 +256,7 @@ void Dynamics::solve(Island& island, double substep_s) {
     body.applyGravity();
   }
   solver_.solve(island.bodies, island.manifolds, island.joints, substep_s);
-  // What nothing holds is at rest only if it does not move at all.
+  // A body that nothing holds is at rest only if it does not move at all.
   const bool held = !island.manifolds.empty() || !island.joints.empty();
   bool tired = std::none_of(island.joints.begin(), island.joints.end(),
                             [](auto* joint) { return is_told_to_move(*joint); });

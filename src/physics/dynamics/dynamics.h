@@ -27,8 +27,8 @@ class Dynamics final : public btDiscreteDynamicsWorld {
   // allocate.
   void reserve(size_t bodies);
 
-  // Selects the bodies that are simulated from now on. What contacts and joints could move with one
-  // of them must be among them.
+  // Selects the bodies that are simulated from now on, with all that contacts and joints could move
+  // with one of them.
   void set_bodies(const std::vector<btRigidBody*>& bodies);
 
   // Takes the state of another copy of the world that has the same pairs in the same order, as far

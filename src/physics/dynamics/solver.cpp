@@ -21,8 +21,8 @@ constexpr double kTouching_m = 1e-5;
 // A contact without a load that opens faster than this bears none: in a substep of 1 ms it opens by
 // a tenth of kTouching_m.
 constexpr double kStanding_m_s = 1e-3;
-// Of the correction of penetration. What they leave is corrected in the next substep, since the
-// depth is measured anew; the tolerance moves a body by 50 nm in a substep of 5 ms.
+// Of the correction of penetration. The next substep corrects the rest, since it measures the depth
+// again; the tolerance moves a body by 50 nm in a substep of 5 ms.
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
 // Sweeps before the first check, and between checks; a factorization may cost as much as that many
@@ -157,9 +157,9 @@ void Solver::add_body(btRigidBody& body, double substep_s) {
 }
 
 // The velocities of a mechanism's bodies are those in the middle between two poses. Half a substep
-// after a pose the angular momentum is I w + swing(w), and half a substep before it likewise; what
-// joints and forces give is the difference: a leapfrog, which is of second order, keeps angular
-// momentum, and lets no top's nutation grow. The swing depends on the result, and is found anew
+// after a pose the angular momentum is I w + swing(w), and half a substep before it likewise;
+// joints and forces give the difference: a leapfrog, which is of second order, keeps angular
+// momentum, and lets no top's nutation grow. The swing depends on the result, and is found again
 // until it fits (swing_again). Rows at stops of Bullet's own joints assume the other velocities:
 // only for trees of joints.
 void Solver::begin_to_swing(double substep_s) {
@@ -381,7 +381,7 @@ double Solver::sweep(int number) {
 }
 
 // The accuracy at which sweeps end. It follows the velocities of the last substep, which forces
-// have not changed yet: what stands is solved more accurately than what moves.
+// have not changed yet: standing bodies are solved more accurately than moving ones.
 double Solver::tolerance() const {
   if (!blocks_.empty() || bodies_.size() <= kFewBodies + 1) return settings_.tolerance_m_s;
   double fastest = 0.0;

@@ -179,7 +179,7 @@ class JointBlocks {
   std::vector<Row> locked_;  // of trees, for Newton's method
   std::vector<Third> thirds_;
   static constexpr size_t kNoThird = SIZE_MAX;
-  std::vector<size_t> third_of_row_;  // asked for each pair of rows; shorter where none follows
+  std::vector<size_t> third_of_row_;  // looked up for each pair of rows; shorter where none follows
   std::vector<Joint> joints_;
   std::vector<size_t> parents_;  // union-find over bodies
   std::vector<Block> blocks_;

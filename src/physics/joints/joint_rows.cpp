@@ -339,7 +339,7 @@ void JointBlocks::tell_rows(Newton& newton, const SolverBodies& bodies) {
   }
 }
 
-// What a joint of a tree transmits.
+// The rows of the forces and moments that a joint of a tree transmits.
 void JointBlocks::add_locked_rows(const Joint& joint, const SolverBodies& bodies) {
   using Kind = JointWays::Kind;
   const Kind kind = joint.ways.kind;

@@ -35,8 +35,8 @@ double JointBlocks::damper_gives(const Block& block, size_t motor) const {
   return -block.tree.rate_after(way_of_row_[motor]) / damper->softness - damper->impulse;
 }
 
-// Motors that hold get their rate error; those at a bound get what they can give, and their dampers
-// what the rate makes of them.
+// Motors that hold get their rate error; those at a bound get their maximum, and their dampers
+// the impulse that follows from the rate.
 double JointBlocks::aim_motors(Block& block) {
   double worst = 0.0;
   x_.resize(block.free.size());
@@ -78,8 +78,8 @@ void JointBlocks::aim_stops(Block& block, double& worst) const {
   }
 }
 
-// After a solution, of a stop that holds: what its motor gives at that rate, and the stop the rest.
-// A motor that moves against the stop gives its maximum, but one without any only what is needed.
+// After a solution, of a stop that holds: the motor's impulse at that rate; the stop gives the
+// rest. A motor that moves against the stop gives its maximum, or as much as needed if it has none.
 JointBlocks::Shares JointBlocks::shares_of(const Block& block, const Stop& stop) const {
   constexpr double kNoMaximum = 0.9e9;  // N m or N
   constexpr double kSame = 1e-9;        // rad/s, m/s
@@ -130,7 +130,7 @@ size_t JointBlocks::choose_stops(Block& block, size_t most) {
   return wrong;
 }
 
-// The impulses of stops, and of what is beside those that hold.
+// The impulses of stops, and of the motors and dampers beside stops that hold.
 void JointBlocks::give_shares(Block& block) {
   for (const Stop& stop : block.stops) {
     if (!stop.holds) {
@@ -187,7 +187,7 @@ double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
   size_t least = SIZE_MAX;
   int left = kAllAtOnce;
   const int most = kMost + static_cast<int>(block.stops.size());
-  for (const Stop& stop : block.stops) {  // they share anew
+  for (const Stop& stop : block.stops) {  // stop and motor divide the impulse again
     if (stop.motor == JointTree::kNone) continue;
     rows_[stop.motor].impulse += stop.sign * std::exchange(rows_[stop.row].impulse, 0.0);
   }

@@ -18,7 +18,7 @@ bool moves_freely(const btRigidBody& body) {
          inverse.y() > 0.0 && inverse.z() > 0.0;
 }
 
-// What a drive keeps upright: it moves in a horizontal plane, and turns about its normal.
+// A drive keeps such a body upright: it moves in a horizontal plane, and turns about its normal.
 bool moves_in_plane(const btRigidBody& body) {
   return body.getLinearFactor() == btVector3(1, 1, 0) &&
          body.getAngularFactor() == btVector3(0, 0, 1);

@@ -1,5 +1,5 @@
-// Joints and surfaces that are simplified. Reported once while a world loads, so that nobody has to
-// find out.
+// Joints and surfaces that are simplified. The findings are reported once while a
+// world loads.
 #include "physics/joints/simplifications.h"
 
 #include <algorithm>
@@ -71,7 +71,7 @@ void look_at_friction(const world::WorldModel& world, const world::BodyLayout& l
   }
 }
 
-// What a joint takes away of the freedom of its bodies.
+// The number of degrees of freedom that a joint takes from its bodies.
 size_t rows_of(const world::Joint& joint) {
   switch (joint.type) {
     case world::JointType::fixed: return 6;

@@ -1,4 +1,4 @@
-// What the physics simplifies compared to the world's files, with file and line.
+// Findings where the physics simplifies the world's files, with file and line.
 #pragma once
 
 #include <vector>

@@ -24,8 +24,8 @@ from .recording import Array, Recording
 
 WINDOW_M = 0.15  # half length of the line around a reading
 LEAST_POINTS = 8
-FLAT_M = 0.03  # a surface whose points spread more across is none
-STEEPEST = np.radians(75)  # of incidence, beyond which a reading tells little
+FLAT_M = 0.03  # points that spread more across make no surface
+STEEPEST = np.radians(75)  # of incidence; readings beyond it are too uncertain
 OUTLIER_M = 0.3  # half width of what residuals are modelled in
 _MOST_POINTS = 300_000
 _MOST_READINGS = 40_000
