@@ -136,26 +136,19 @@ const tools = {
   },
   // Waits for a line from the program that started this.
   told: async () => (await lines.next()).value,
-  // Waits until a condition in the page holds: a function, since the page evaluates no texts. One
-  // that throws does not hold: a part of the page may not be there yet. A working page reaches no
-  // limit, however slow the machine.
-  until: async (what, test, argument) => {
-    const end = Date.now() + kPatience_ms;
-    for (;;) {
-      try {
-        await page.waitForFunction(test, argument, { timeout: end - Date.now(), polling: 100 });
-        break;
-      } catch (error) {
-        const early = /TypeError/.test(error.message) && Date.now() + 200 < end;
-        if (!early)
-          throw new Error(
-            `waited for: ${what}; there was: ${await shown()}${/Timeout/.test(error.message) ? "" : `; ${error.message.split("\n")[0]}`}`,
-          );
-        await new Promise((done) => setTimeout(done, 100));
-      }
-    }
-    if (!what.startsWith("(")) seen(what);
-  },
+  // Waits until a condition in the page holds: a function, since the page evaluates no texts. A
+  // working page reaches no limit, however slow the machine.
+  until: (what, test, argument) =>
+    page.waitForFunction(test, argument, { timeout: kPatience_ms, polling: 100 }).then(
+      () => {
+        if (!what.startsWith("(")) seen(what);
+      },
+      async (error) => {
+        throw new Error(
+          `waited for: ${what}; there was: ${await shown()}${/Timeout/.test(error.message) ? "" : `; ${error.message.split("\n")[0]}`}`,
+        );
+      },
+    ),
   check: (what, good, found = "") => {
     if (!good) throw new Error(`not so: ${what}; there was: ${found}`);
     seen(what);

@@ -268,7 +268,7 @@ export default async function edit({ page, seen, until, check, picture, still, o
   await until("it is saved", () => window.notes.some((note) => /^Saved to/.test(note)));
   await until(
     "nothing is left to save",
-    () => !/•/.test(document.getElementById("save").textContent),
+    () => !/•/.test(document.getElementById("save")?.textContent),
   );
   console.log(
     `poses: ${JSON.stringify(await page.evaluate(() => Object.fromEntries(window.ruedo.editor.models.map(({ name }) => [name, window.ruedo.editor.pose(name)]))))}`,

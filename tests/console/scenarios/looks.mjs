@@ -23,7 +23,7 @@ export default async function looks({ page, until, check, ready, still, onScreen
     "a way is measured",
     () =>
       Math.abs(parseFloat(document.getElementById("coordinates").textContent) - 3) < 0.05 &&
-      /level/.test(document.getElementById("coordinates").textContent),
+      /level/.test(document.getElementById("coordinates")?.textContent),
   );
   check("(in words)", true, await page.evaluate(words));
   const differs = await page.evaluate(() => {

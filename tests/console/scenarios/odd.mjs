@@ -81,7 +81,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
   for (let i = 0; i < 5; ++i) await page.keyboard.press("ArrowRight");
   for (let i = 0; i < 4; ++i) await page.keyboard.press("ArrowUp");
   await until("what is drawn by keys is seen", () =>
-    /^\d+\.\d\d × \d+\.\d\d m$/.test(document.getElementById("drawing").textContent),
+    /^\d+\.\d\d × \d+\.\d\d m$/.test(document.getElementById("drawing")?.textContent),
   );
   await picture("drawn");
   const ended = await page.locator(".cross").boundingBox();
@@ -106,7 +106,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
   // ---- what the program warns of
   await page.getByRole("tab", { name: "Notes" }).click();
   await until("the page has the program's warnings", () =>
-    /unsupported.*world\.sdf:\d+.*audio/.test(document.getElementById("warnings").textContent),
+    /unsupported.*world\.sdf:\d+.*audio/.test(document.getElementById("warnings")?.textContent),
   );
 
   // ---- the graphics
@@ -117,7 +117,7 @@ export default async function odd({ page, until, check, ready, server, expect, p
     window.loss.loseContext();
   });
   await until("lost graphics are reported", () =>
-    /3-D graphics/.test(document.getElementById("notice").textContent),
+    /3-D graphics/.test(document.getElementById("notice")?.textContent),
   );
   await page.evaluate(() => window.loss.restoreContext());
   await until("and come back", () => document.getElementById("notice").hidden);

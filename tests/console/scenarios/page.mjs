@@ -208,10 +208,10 @@ export default async function looks(tools) {
   seen("kill the server");
   await told();
   await until("it says that the connection is lost", () =>
-    /connection to the server is lost/.test(document.getElementById("notice").textContent),
+    /connection to the server is lost/.test(document.getElementById("notice")?.textContent),
   );
   await until("and that it tries again", () =>
-    /Trying again/.test(document.getElementById("notice").textContent),
+    /Trying again/.test(document.getElementById("notice")?.textContent),
   );
   await picture("lost");
   seen("begin the server");

@@ -256,7 +256,7 @@ async function picks({ page, until, check, still }) {
     await page.mouse.click(mx, my);
   }
   await until("a way is measured in a further view", () =>
-    /^(1\.9[5-9]|2\.0[0-5]) m/.test(document.getElementById("coordinates").textContent),
+    /^(1\.9[5-9]|2\.0[0-5]) m/.test(document.getElementById("coordinates")?.textContent),
   );
   await tool("select");
   await page.getByRole("tab", { name: "World" }).click();

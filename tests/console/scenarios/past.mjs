@@ -24,7 +24,7 @@ export default async function past({ page, seen, until, check, ready, server, pi
     rewind.show(rewind.range.end - 0.5);
   });
   await until("a moment ago is called so, where nothing came or went since", () =>
-    /s ago$/.test(document.getElementById("state").textContent),
+    /s ago$/.test(document.getElementById("state")?.textContent),
   );
   await page.locator("#live").click();
   await page.keyboard.press("b");
@@ -49,7 +49,7 @@ export default async function past({ page, seen, until, check, ready, server, pi
     () => !window.ruedo.page.now.scene.models.some(({ name }) => name === "box"),
   );
   await until("it says how long ago that was", () =>
-    /s ago$/.test(document.getElementById("state").textContent),
+    /s ago$/.test(document.getElementById("state")?.textContent),
   );
   await until(
     "values are of that moment",

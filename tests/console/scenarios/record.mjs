@@ -10,7 +10,7 @@ export default async function record({ page, given, until, check, ready }) {
   await until("(it drives)", (from) => window.ruedo.poses.to[0] > from + 0.3, x);
   await page.keyboard.up("w");
   await until("the size is shown", () =>
-    /^Stop log \(\d+\.\d MB\)$/.test(document.getElementById("record-log").textContent),
+    /^Stop log \(\d+\.\d MB\)$/.test(document.getElementById("record-log")?.textContent),
   );
   const [download] = await Promise.all([page.waitForEvent("download"), button.click()]);
   await download.saveAs(given.file);

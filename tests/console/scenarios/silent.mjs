@@ -21,7 +21,7 @@ export default async function silent({ page, seen, until, check, ready, told, pi
   seen("stop");
   await told();
   await until("the page says that nobody answers", () =>
-    /does not answer/.test(document.getElementById("notice").textContent),
+    /does not answer/.test(document.getElementById("notice")?.textContent),
   );
   await until(
     "and not that it runs",
