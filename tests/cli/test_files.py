@@ -260,7 +260,7 @@ def test_names_of_ros_are_for_bags(tmp_path):
     assert ruedo(*run).returncode == 0
     for option in (["--remap", "/scan=/x"], ["--distro", "jazzy"]):
         done = ruedo("export", log, tmp_path / "x.mcap", *option)
-        assert done.returncode == 2 and "they go with --ros2" in done.stderr, done
+        assert done.returncode == 2 and "they need --ros2" in done.stderr, done
     done = ruedo("export", log, "--ros2", tmp_path / "bag", "--remap", "/nosuch=/x")
     assert done.returncode == 2 and "no ROS topic or service '/nosuch'" in done.stderr, done
     assert sorted(tmp_path.iterdir()) == [log]
