@@ -226,7 +226,9 @@ def test_commands_are_found():
 def test_packages_of_the_scripts_are_listed():
     script = (ROOT / "scripts/lib.sh").read_text(encoding="utf-8")
     page = (ROOT / "docs/install.md").read_text(encoding="utf-8").split()
-    for group in re.findall(r"readonly (?:BUILD_LIBRARIES|\w+_PACKAGES)=\((.*?)\)", script, re.DOTALL):
+    for group in re.findall(
+        r"readonly (?:BUILD_LIBRARIES|\w+_PACKAGES)=\((.*?)\)", script, re.DOTALL
+    ):
         group = re.sub(r"\$\{\w+\[@\]\}", "", group)  # another list
         for specification in group.replace('"', "").replace("?", "").split():
             assert set(specification.split("|")) & set(page), specification
