@@ -187,3 +187,10 @@ ensure_multicast_route() {
   "${as_root[@]}" ip route add 239.255.76.67/32 dev lo 2>/dev/null
   has_multicast_route && say "there was no multicast route: added one on the loopback interface (ip route add 239.255.76.67/32 dev lo)"
 }
+
+# A regular expression of the tests of these tiers (tests/tiers.txt).
+tests_of() {
+  local names
+  names=$(awk -v tiers=" $* " 'index(tiers, " " $1 " ") {for (i = 2; i <= NF; ++i) print $i}' "$ruedo_root/tests/tiers.txt" | paste -sd '|')
+  printf '^(%s)$' "$names"
+}
