@@ -253,6 +253,50 @@ def test_a_robot_without_a_drive_has_faults():
         assert [scan.ranges.max() for scan in seen.all(robot.lrf)] == [math.inf] + 5 * [0.5]
 
 
+class SlowSocket:
+    """A connection whose publish() does not return before the reply has been received."""
+
+    info = types.SimpleNamespace(run_id=7, version="1", features=-1)
+    clock = types.SimpleNamespace(utime=0)
+
+    def __init__(self):
+        self.bus, self.kinds, self.waited = self, [], []
+        self.session = Session(self, "slow")
+
+    def publish(self, channel, data):
+        request = decode(lcmtypes.request_t, data)
+        reply = lcmtypes.reply_t()
+        reply.run_id, reply.kind, reply.sequence = request.run_id, request.kind, request.sequence
+        reply.session = 3
+        self.kinds.append(request.kind)
+        receiving = threading.Thread(
+            target=self.session.receive, args=(reply.encode(),), daemon=True
+        )
+        receiving.start()
+        receiving.join(60.0)
+        self.waited.append(receiving.is_alive())
+
+    def is_of_our_run(self, run_id):
+        return run_id == 7
+
+    def server_has_ended(self):
+        return False
+
+    def check_open(self):
+        pass
+
+    check_may_wait = check_server = check_open
+
+
+def test_replies_are_received_while_a_request_is_sent():
+    socket = SlowSocket()
+    kinds = lcmtypes.request_t
+    socket.session.request(kinds.PAUSE, timeout=PATIENCE)
+    socket.session.leave()
+    assert socket.kinds == [kinds.JOIN, kinds.PAUSE, kinds.LEAVE]
+    assert socket.waited == [False] * 3
+
+
 def test_a_timeout_in_lockstep_advises_to_step():
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
         robot = sim.robot("p3at")

@@ -107,14 +107,17 @@ class Session:
         # and the program has ended.
         its_turn = self._one_at_a_time.acquire(timeout=_REPEAT_SECONDS * _MOST_LEAVES)
         try:
+            sequence = self.next_sequence()
             with self._news:
-                sequence = self.next_sequence()
                 self._awaited, self._reply = (lcmtypes.request_t.LEAVE, sequence), None
-                for _ in range(_MOST_LEAVES):
-                    self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
-                    self._news.wait(_REPEAT_SECONDS)
-                    if self._reply is not None or self._connection.server_has_ended():
-                        break
+            for _ in range(_MOST_LEAVES):
+                self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
+                with self._news:
+                    self._news.wait_for(lambda: self._reply is not None, _REPEAT_SECONDS)
+                    answered = self._reply is not None
+                if answered or self._connection.server_has_ended():
+                    break
+            with self._news:
                 self._awaited, self._session = None, 0
         finally:
             if its_turn:
