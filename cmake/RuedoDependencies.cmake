@@ -91,6 +91,9 @@ if("${PACKAGE_VERSION}" VERSION_LESS 1.5.3 OR NOT EXISTS ${lcm_library})
   message(FATAL_ERROR "LCM 1.5.3 was not found: pip install lcm==1.5.3 into a virtual environment, and give the folder of its lcmConfig.cmake "
     "as -Dlcm_DIR=VENV/lib/python3.X/site-packages/lib/lcm/cmake")
 endif()
+# Beside our copies of libraries, so that no program says where its virtual environment is.
+file(COPY_FILE ${lcm_library} ${ruedo_math_folder}/liblcm.so.1 ONLY_IF_DIFFERENT)
+set(lcm_library ${ruedo_math_folder}/liblcm.so.1)
 add_library(ruedo::lcm SHARED IMPORTED GLOBAL)
 set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${lcm_library} IMPORTED_SONAME liblcm.so.1
   INTERFACE_INCLUDE_DIRECTORIES ${lcm_wheel}/include)

@@ -3,18 +3,18 @@
 include(CMakePackageConfigHelpers)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/ruedo)
 
-set_target_properties(ruedo ruedo-measure ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
-install(TARGETS ruedo ruedo-measure ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+set_target_properties(ruedo ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
+install(TARGETS ruedo ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
 install(FILES ${PROJECT_SOURCE_DIR}/src/world/urdf/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
 # LCM, which comes from a wheel and may be missing where the tree is moved to; libraries that call our elementary functions.
-install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
+install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
 install(FILES ${copies} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 get_property(late GLOBAL PROPERTY RUEDO_LATE_LIBRARIES)
-install(TARGETS ${late} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
+install(TARGETS ${late} ruedo_core LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 
 # find_package(ruedo): target ruedo::client in the export set ruedo.
 install(TARGETS ruedo_client EXPORT ruedo ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})

@@ -8,7 +8,7 @@ install(FILES ${completion}/ruedo.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish
 set(pages ${PROJECT_BINARY_DIR}/man1)
 add_custom_command(OUTPUT ${pages}/ruedo.1.gz
   COMMAND ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh $<TARGET_FILE:ruedo> ${pages}
-  DEPENDS ruedo ruedo-measure ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
+  DEPENDS ruedo ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
 add_custom_target(man-pages DEPENDS ${pages}/ruedo.1.gz)
 file(MAKE_DIRECTORY ${pages})
 install(DIRECTORY ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR})

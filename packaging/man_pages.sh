@@ -10,8 +10,7 @@ page() {    # NAME WHAT COMMAND...
     sed "s/^\.TH .*/.TH ${name^^} 1 \"\" \"$("$ruedo" --version)\" \"User Commands\"/" | gzip -9n >"$folder/$name.1.gz"
 }
 page ruedo "a simulation server for mobile robots" "$ruedo"
-# The two programs that ruedo starts.
-page ruedo-measure "what ruedo bench and ruedo experiments start" "$(dirname "$ruedo")/ruedo-measure"
+# The program that ruedo starts.
 cat <<PAGE | gzip -9n >"$folder/ruedo-import-mesh.1.gz"
 .TH RUEDO-IMPORT-MESH 1 "" "$("$ruedo" --version)" "User Commands"
 .SH NAME

@@ -715,7 +715,6 @@ def test_binaries_import_no_elementary_function():
     build = Path(os.environ["RUEDO_BINARY_DIR"])
     built = [
         build / "bin/ruedo",
-        build / "bin/ruedo-measure",
         build / "bin/ruedo-import-mesh",
         *build.glob("python/ruedo/_engine*.so"),
         *build.glob("math/lib*.so*"),

@@ -55,6 +55,7 @@ def test_the_wheels_are_for_debian_12_and_hold_licences():
     assert any(name.endswith(".dist-info/licenses/copyright") for name in names["ruedo"])
     licence = ".dist-info/licenses/debian/libosmesa6"
     assert any(name.endswith(licence) for name in names["ruedo_camera"])
+    assert WHEELS["ruedo"].stat().st_size < 50e6  # at level 1 of zlib; scripts/release: 45 MB at 9
     everything = [name for of in names.values() for name in of]
     assert len(set(everything)) == len(everything)  # pip would remove another's file
 

@@ -150,7 +150,8 @@ std::string shipped_worlds() {
   // A build within its source tree, which may be a copy, and one elsewhere.
   if (const std::string beside = find_installed("worlds/arena.sdf"); !beside.empty())
     return full_path(fs::path(beside).parent_path().string());
-  return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
+  const char* const worlds = RUEDO_SOURCES "/worlds";
+  return is_folder(worlds) ? full_path(worlds) : "";
 }
 
 ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute)

@@ -29,7 +29,7 @@ std::string script() {
   for (const char* path : {"share/ruedo/xacro/expand.py", "src/world/urdf/xacro/expand.py"}) {
     if (std::string found = find_installed(path); !found.empty()) return found;
   }
-  return RUEDO_XACRO_DIR "/expand.py";  // of a build outside of its source tree
+  return RUEDO_SOURCES "/src/world/urdf/xacro/expand.py";  // of a build outside of its source tree
 }
 
 // "FILE:LINE", added to each element by expand.py.
@@ -53,7 +53,8 @@ std::string xacro_python() {
   if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
   if (std::string own = find_installed(".venv/bin/python"); !own.empty()) return own;
   std::error_code error;
-  return fs::exists(RUEDO_PYTHON, error) ? RUEDO_PYTHON : "python3";
+  const char* const python = RUEDO_SOURCES "/.venv/bin/python";
+  return fs::exists(python, error) ? python : "python3";
 }
 
 bool is_xacro(const std::string& path, const Element* root) {
