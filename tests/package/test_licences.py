@@ -5,6 +5,7 @@ build has read and the wheel holds, and what copyright file and SBOM say of it.
 import json
 import os
 import re
+import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -105,3 +106,29 @@ def test_the_sbom_has_the_licence_of_each_part(sbom):
         assert words <= SPDX, f"{package['name']}: {licence}"
         assert package["licenseConcluded"] == licence
     assert len({package["SPDXID"] for package in sbom["packages"]}) == len(sbom["packages"])
+
+
+NOTICES = (
+    r"copyright|\(c\) *(19|20)[0-9]{2}|SPDX-License|licen[sc]ed under|general public licen[sc]e"
+)
+# Of others' licences these speak: the tables of what a release holds, and those who make them.
+OF_OTHERS = (
+    "packaging/",
+    "tests/package/",
+    "scripts/make_sbom.py",
+    "scripts/make_wheel.py",
+    "scripts/release",
+    "cmake/RuedoInstall.cmake",
+    "docs/platforms.md",
+)
+
+
+def test_no_file_of_the_tree_is_under_anothers_licence():
+    """The tree has one licence, and whoever copies a file into it brings its notice along."""
+    words = ["git", "-C", SOURCE, "grep", "-I", "-i", "-l", "-E", NOTICES]
+    done = subprocess.run(words, stdout=subprocess.PIPE, text=True)
+    if done.returncode > 1:
+        pytest.skip("no checkout of git's")
+    assert "LICENSE" in done.stdout.split()
+    found = [name for name in done.stdout.split() if not name.startswith(OF_OTHERS)]
+    assert found == ["LICENSE"]

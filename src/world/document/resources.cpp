@@ -150,7 +150,7 @@ std::string shipped_worlds() {
   // A build within its source tree, which may be a copy, and one elsewhere.
   if (const std::string beside = find_installed("worlds/arena.sdf"); !beside.empty())
     return full_path(fs::path(beside).parent_path().string());
-  const char* const worlds = RUEDO_SOURCES "/worlds";
+  const char* const worlds = RUEDO_SOURCE_TREE "/worlds";
   return is_folder(worlds) ? full_path(worlds) : "";
 }
 

@@ -29,7 +29,7 @@ std::string script() {
   for (const char* path : {"share/ruedo/xacro/expand.py", "src/world/urdf/xacro/expand.py"}) {
     if (std::string found = find_installed(path); !found.empty()) return found;
   }
-  return RUEDO_SOURCES "/src/world/urdf/xacro/expand.py";  // of a build outside of its source tree
+  return RUEDO_SOURCE_TREE "/src/world/urdf/xacro/expand.py";  // of a build outside of its source tree
 }
 
 // "FILE:LINE", added to each element by expand.py.
@@ -53,7 +53,7 @@ std::string xacro_python() {
   if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
   if (std::string own = find_installed(".venv/bin/python"); !own.empty()) return own;
   std::error_code error;
-  const char* const python = RUEDO_SOURCES "/.venv/bin/python";
+  const char* const python = RUEDO_SOURCE_TREE "/.venv/bin/python";
   return fs::exists(python, error) ? python : "python3";
 }
 
