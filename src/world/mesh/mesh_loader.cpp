@@ -27,6 +27,13 @@ namespace ruedo::world {
 namespace {
 
 constexpr size_t kMostBytes = size_t{1} << 30;  // of a mesh, packed
+// In the names of the cache's entries: what assimp makes of a file on another family of processors
+// may differ in the last digits, and a home folder may be on both.
+#ifdef __aarch64__
+constexpr const char* kFamily = "-aarch64";
+#else
+constexpr const char* kFamily = "";
+#endif
 
 std::string default_importer() {
   if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty())
@@ -182,7 +189,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
   const std::string content = bytes_of(path, MeshLimits::kFileBytes);
   files_.push_back(path);
   const std::string name = content_key(content) + extension.substr(1) + "-" +
-                           std::to_string(kMeshFormatVersion) + ".mesh";
+                           std::to_string(kMeshFormatVersion) + kFamily + ".mesh";
   if (import_.cache) {
     const std::string entry = import_.cache_folder + "/" + name;
     std::error_code error;
@@ -204,7 +211,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
 std::shared_ptr<const Mesh> MeshLoader::divided_or_cached(const Mesh& mesh, size_t most) const {
   const std::string solid = pack_solid(mesh);
   const std::string name = content_key(solid) + "-" + std::to_string(most) + "-" +
-                           std::to_string(kPiecesVersion) + ".pieces";
+                           std::to_string(kPiecesVersion) + kFamily + ".pieces";
   const auto taken = [](const std::string& bytes) -> std::shared_ptr<const Mesh> {
     auto pieces = std::make_shared<Mesh>(unpack_mesh(bytes).mesh);
     return pieces->parts.empty() ? nullptr : pieces;
