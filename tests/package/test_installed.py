@@ -105,6 +105,10 @@ def test_the_message_types_are_there_for_c_plus_plus(prefix, tmp_path):
     )
     run("sh", "-c", f"g++ -std=c++17 a.cpp -o a {flags.strip()}", cwd=tmp_path)
     assert run(tmp_path / "a") == "2e16efb052b0105e"  # bot_core's
+    headers = list(prefix.glob("include/ruedo/*_t.hpp"))
+    assert len(headers) > 50
+    # Of a type that holds others: found beside it, and not where the build was.
+    assert not [file.name for file in headers if '#include "/' in file.read_text()]
 
 
 def test_the_licences_of_all_that_is_inside_are_there(prefix):
