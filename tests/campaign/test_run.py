@@ -626,7 +626,7 @@ def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
     shutil.copytree(SOURCE / "clients/python/examples/labs", tmp_path / "labs")
     folder = tmp_path / "labs/marking"
     students = {
-        "done": "class square:\n    def __init__(self, robot): pass\n    def __call__(self, view): return 'done'\nwall_following = sonar_avoidance = umbmark = mapping = particle_filter = square\n",
+        "done": "class square:\n    def __init__(self, robot): pass\n    def __call__(self, view): return 'done'\nwall_following = sonar_avoidance = umbmark = mapping = particle_filter = planning = vision = many_robots = square\n",
         "bad": "def square(robot):\n    robot.drive(1 / 0, 0.0)\ndef wall_following(robot):\n    for _ in range(9):\n        robot.drive(0.0, 0.0)\ndef sonar_avoidance(robot):\n    while True:\n        robot.drive(0.4, 0.0)\n",
         "$(touch here); 'a name' {lab}": "def umbmark(robot)\n",
     }
@@ -641,10 +641,10 @@ def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
     )
     frame = Campaign(folder / "labs.yaml").results().frame()
     passed = frame[frame.passed].groupby("controller").size()
-    assert dict(passed) == {"solution": 6}
+    assert dict(passed) == {"solution": 9}
     assert set(frame[~frame.passed].status) <= {"failed", "crashed"}
     reasons = {(row.controller, row.lab): row.reason for row in frame.itertuples()}
-    assert len(reasons) == 4 * 6
+    assert len(reasons) == 4 * 9
     for student, lab, text in (
         ("done", "square", "was not at the corner 2, 0 in its turn"),
         ("done", "wall_following", "went 0.0 m, and 6 are asked for"),
@@ -652,6 +652,9 @@ def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
         ("bad", "wall_following", "went 0.0 m, and 6 are asked for"),
         ("bad", "sonar_avoidance", "touched"),
         ("bad", "mapping", "nothing was handed in"),
+        ("done", "planning", "p3at ends "),
+        ("done", "vision", " m from the red beacon, not 1"),
+        ("done", "many_robots", "p3at ends "),
         ("$(touch here); 'a name' {lab}", "umbmark", "SyntaxError"),
     ):
         assert text in reasons[student, lab], reasons[student, lab]

@@ -153,3 +153,50 @@ def test_the_wall_following_lab_judges_programs(way, text):
 def test_the_avoidance_lab_judges_programs(way, text):
     said = why_not("sonar_avoidance", way)
     assert text in said and bool(text) == bool(said)
+
+
+def ending(lab, seed, places):
+    """Why robots that end at these places have not passed."""
+    ways = dict(zip(labs.LABS[lab].robots, (np.array([place]) for place in places)))
+    run = labs.Run(lab, seed, 0.0, ways["p3at"], np.zeros((0, 3)), "", ways)
+    try:
+        labs.LABS[lab].judge(run)
+    except labs.Failed as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("lab", ["planning", "many_robots"])
+def test_labs_with_goals_judge_where_each_robot_ends(lab):
+    goals = np.array(labs.goals(lab, 3))
+    assert ending(lab, 3, goals) == ""
+    assert ending(lab, 3, goals + (0.2, 0.2)) == ""  # 0.28 m
+    away = goals.copy()
+    away[-1] += (0.0, 0.5)
+    assert ending(lab, 3, away) == f"{labs.LABS[lab].robots[-1]} ends 0.50 m from its goal"
+    if len(goals) > 1:
+        assert "from its goal" in ending(lab, 3, np.roll(goals, 1, axis=0))
+
+
+def test_the_vision_lab_judges_the_distance_from_the_red_beacon():
+    beacons = {name: np.array(place) for name, place in labs.beacons("vision", 3).items()}
+    assert ending("vision", 3, [beacons["red"] + (1.2, 0.0)]) == ""
+    assert ending("vision", 3, [beacons["red"] + (1.4, 0.0)]).startswith("ends 1.40 m from")
+    assert "from the red beacon" in ending("vision", 3, [beacons["green"] + (0.0, 1.0)])
+
+
+def test_drawn_worlds_leave_room_for_a_robot():
+    """0.36 m is half the diagonal of the P3-AT with its wheels."""
+    for seed in range(200):
+        x, y, _ = labs.start("planning", seed)
+        goal = labs.goals("planning", seed)[0]
+        for post in labs.posts("planning", seed):
+            assert min(math.dist(post, (x, y)), math.dist(post, goal)) > labs.POST + 0.4
+        for a, b in pairwise([(x, y), goal]):
+            assert np.linalg.norm(labs.points(labs.walls("planning", seed)) - a, axis=1).min() > 0.5
+            assert np.linalg.norm(labs.points(labs.walls("planning", seed)) - b, axis=1).min() > 0.5
+        team = np.array(labs.starts_of_team(seed))[:, :2]
+        apart = np.linalg.norm(team[:, None] - team, axis=2)[np.triu_indices(4, 1)]
+        assert apart.min() > 2.0 and len(set(labs.goals("many_robots", seed))) == 4
+        beacons = labs.beacons("vision", seed).values()
+        assert all(abs(x) < 3 and abs(y) < 2 for x, y in beacons)

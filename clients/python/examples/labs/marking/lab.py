@@ -6,6 +6,7 @@ its own, which reaches nothing but this.
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import runpy
@@ -16,17 +17,22 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 SIDE = 2.0  # m, of squares
 APART = 0.8  # m, from the wall
+BEFORE = 1.0  # m, from the red beacon's middle to the robot's
 
 
 class Robot:
     """time: s. odometry: x, y, angle turned (m, m, rad), by the wheels. ranges: of the range finder
     (m), a degree apart from -90 to 90. sonar: of the eight in front (m), from left to right.
 
-    pose: x, y, heading (m, m, rad), as a camera on the ceiling sees it; in umbmark and mapping.
-    walls: the map, a list of both ends (m) of each; in particle_filter.
+    pose: x, y, heading (m, m, rad), as a camera on the ceiling sees it; in umbmark, mapping and
+    planning. walls: the map, a list of both ends (m) of each; in particle_filter and planning.
+    goal: x, y (m); in planning. image: (60, 80, 3) red, green, blue, 0 to 255, of a camera that
+    sees 60 degrees from left to right, 0.19 m before the robot's middle; in vision. poses: (4, 3),
+    goals: (4, 2), of all robots; in many_robots.
     """
 
     time: float
@@ -35,16 +41,21 @@ class Robot:
     sonar: np.ndarray
     pose: np.ndarray
     walls: np.ndarray
+    goal: np.ndarray
+    image: np.ndarray
+    poses: np.ndarray
+    goals: np.ndarray
 
     def __init__(self, hears: IO[str], says: IO[str]) -> None:
         self._hears, self._says = hears, says
         self._hear()
 
-    def drive(self, speed: float, turn: float) -> None:
-        """Goes on so (m/s, rad/s) for a tenth of a second; the readings are those of its end. Ends
-        the program when the lab's time is over.
+    def drive(self, speed: ArrayLike, turn: ArrayLike) -> None:
+        """Goes on so (m/s, rad/s) for a tenth of a second; the readings are those of its end. In
+        many_robots a number for each robot. Ends the program when the lab's time is over.
         """
-        self._say("drive", [float(speed), float(turn)])
+        told = np.array(np.broadcast_arrays(speed, turn), dtype=float)
+        self._say("drive", told.reshape(2, -1).tolist())
         self._hear()
 
     def hand_in(self, result: Any) -> None:
@@ -64,8 +75,15 @@ class Robot:
         line = self._hears.readline()
         if not line:
             raise SystemExit  # the time is over
-        for name, value in json.loads(line).items():
-            setattr(self, name, value if name == "time" else np.array(value))
+        self._take(json.loads(line))
+
+    def _take(self, readings: dict[str, Any]) -> None:
+        for name, value in readings.items():
+            if name == "image":
+                pixels = np.frombuffer(base64.b64decode(value), np.uint8)
+                self.image = pixels.reshape(60, 80, 3)
+            else:
+                setattr(self, name, value if name == "time" else np.array(value))
 
 
 def run(file: str, lab: str) -> NoReturn:

@@ -1,33 +1,27 @@
-"""How the labs are marked: the world of each, what a program is given in it, and when it passes.
+"""The labs: the world of each, what a program is given in it, and when it passes.
 
-The referee alone holds the run. It starts a student's program in a sandbox (lab.py), gives it the
-readings, takes its commands, and draws what it hands in into the run's log. The campaign marks the
-log: true poses, and what was handed in. Rooms, starts and errors are drawn by the run's seed.
+Rooms, starts, goals and errors are drawn by the run's seed. The campaign marks the log that
+referee.py leaves: true poses, and what was handed in.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import random
-import select
-import subprocess
-import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import ruedo
-from ruedo import lcmtypes, markers
+from ruedo import lcmtypes
 from ruedo.decoding import decode
 from ruedo.logs import APPLIED_CHANNEL, HEADER_CHANNEL, events
 
-HERE = Path(__file__).resolve().parent
 SIDE, APART = 2.0, 0.8  # m, as in lab.py
+BEFORE = 1.0  # m, from the red beacon, as in lab.py
 THICKNESS = 0.1  # m, of walls
+POST, BEACON = 0.2, 0.15  # m, radii
 Point = tuple[float, float]
 Wall = tuple[Point, Point]
 ROOM: list[Wall] = [
@@ -36,10 +30,15 @@ ROOM: list[Wall] = [
     ((4.0, 3.0), (-4.0, 3.0)),
     ((-4.0, 3.0), (-4.0, -3.0)),
 ]
-PATIENCE = 20.0  # s of real time from readings to the command; less than the lease of lockstep
-LONGEST, MOST_POINTS = 1 << 20, 4000  # bytes of a line, points of a map
+COLOURS = {"red": (0.9, 0.05, 0.05), "green": (0.05, 0.7, 0.05), "blue": (0.05, 0.1, 0.9)}
+TEAM = ("p3at", "second", "third", "fourth")
+EYE = "eye"  # a camera of 80 x 60 pixels and 60 degrees
+CAMERA = """<sensor type='camera'><pose>0.19 0 0.52 0 0 0</pose><update_rate>10</update_rate>
+<camera><horizontal_fov>1.0472</horizontal_fov><image><width>80</width><height>60</height></image>
+<clip><near>0.05</near><far>20</far></clip></camera></sensor>"""
 LAYER = "handed in"
 STRAIGHT = 0.2  # m, that an edge may deviate
+NEAR = 0.3  # m, from a goal
 
 
 class Failed(AssertionError):
@@ -50,12 +49,14 @@ class Failed(AssertionError):
 
 
 def walls(lab: str, seed: int) -> list[Wall]:
-    if lab in ("square", "umbmark"):
+    if lab in ("square", "umbmark", "many_robots"):
         return []
-    if lab in ("wall_following", "sonar_avoidance"):
+    if lab in ("wall_following", "sonar_avoidance", "vision"):
         return ROOM
     draw = random.Random(seed)
     a, b, c = (draw.uniform(-0.4, 0.4) for _ in range(3))
+    if lab == "planning":
+        return [*ROOM, ((-1.3, -3.0), (-1.3, 1.0 + a)), ((1.3, 3.0), (1.3, -1.0 + b))]
     made = [
         *ROOM,
         ((-1.0 + a, -3.0), (-1.0 + a, -0.5)),
@@ -71,11 +72,54 @@ def turned(point: Point, angle: float) -> Point:
     return c * point[0] - s * point[1], s * point[0] + c * point[1]
 
 
+def posts(lab: str, seed: int) -> list[Point]:
+    """What no map has, one in each part of the room of `planning`."""
+    if lab != "planning":
+        return []
+    draw = random.Random(f"posts {seed}")
+    return [
+        (middle + draw.uniform(-0.3, 0.3), draw.uniform(-0.5, 0.5)) for middle in (-2.6, 0.0, 2.6)
+    ]
+
+
+def beacons(lab: str, seed: int) -> dict[str, Point]:
+    """By colour, 2 m from each other and from the robot."""
+    if lab != "vision":
+        return {}
+    draw = random.Random(f"beacons {seed}")
+    while True:
+        places = [(draw.uniform(-2.8, 2.8), draw.uniform(-1.8, 1.8)) for _ in COLOURS]
+        all_places = [*places, start(lab, seed)[:2]]
+        if min(math.dist(a, b) for a in all_places for b in all_places if a is not b) > 2.0:
+            return dict(zip(COLOURS, places))
+
+
+def goals(lab: str, seed: int) -> list[Point]:
+    """One for each robot."""
+    draw = random.Random(f"goals {seed}")
+    if lab == "planning":
+        return [(draw.uniform(2.4, 3.0), draw.uniform(1.4, 2.2))]
+    if lab != "many_robots":
+        return []
+    starts = [one[:2] for one in starts_of_team(seed)]
+    while True:
+        order = draw.sample(range(len(starts)), len(starts))
+        if all(k != other for k, other in enumerate(order)):
+            return [starts[k] for k in order]
+
+
 def world(lab: str, seed: int) -> ruedo.World:
     made = ruedo.World(lab)
     for begin, end in walls(lab, seed):
         made.wall(*begin, *end, thickness=THICKNESS)
-    return made.robot("p3at", *start(lab, seed))
+    for x, y in posts(lab, seed):
+        made.cylinder(x, y, radius=POST, name="post")
+    for name, (x, y) in beacons(lab, seed).items():
+        made.cylinder(x, y, radius=BEACON, height=1.2, colour=COLOURS[name], name=name)
+    for name, place in zip(LABS[lab].robots[1:], starts_of_team(seed)[1:]):
+        made.robot("p3dx", *place, name=name)
+    sensors = {EYE: CAMERA} if "image" in LABS[lab].sees else None
+    return made.robot("p3at", *start(lab, seed), sensors=sensors)
 
 
 def start(lab: str, seed: int) -> tuple[float, float, float]:
@@ -84,6 +128,10 @@ def start(lab: str, seed: int) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     if lab == "wall_following":
         return draw.uniform(-3.0, 2.0), draw.uniform(-1.7, -1.3), draw.uniform(-0.3, 0.3)
+    if lab == "planning":
+        return draw.uniform(-3.0, -2.4), draw.uniform(-2.2, -1.6), draw.uniform(-3.0, 3.0)
+    if lab == "many_robots":
+        return starts_of_team(seed)[0]
     while True:
         place = draw.uniform(-3.0, 3.0), draw.uniform(-3.0, 3.0)
         apart = np.linalg.norm(points(walls(lab, seed)) - place, axis=1)
@@ -91,145 +139,41 @@ def start(lab: str, seed: int) -> tuple[float, float, float]:
             return *place, draw.uniform(-math.pi, math.pi)
 
 
-def points(of: list[Wall]) -> np.ndarray:
-    """(n, 2) m, every 0.1 m along the walls."""
-    return np.concatenate([np.linspace(a, b, 1 + round(10 * math.dist(a, b))) for a, b in of])
+def starts_of_team(seed: int) -> list[tuple[float, float, float]]:
+    """About the corners of a square."""
+    draw = random.Random(f"team {seed}")
+    made = []
+    for k in range(len(TEAM)):
+        angle = (k + 0.5) * math.pi / 2 + draw.uniform(-0.15, 0.15)
+        x, y = turned((draw.uniform(2.2, 2.6), 0.0), angle)
+        made.append((x, y, draw.uniform(-math.pi, math.pi)))
+    return made
 
 
-# ---- The run.
-
-
-class Fault(Exception):
-    """What a program did instead of driving."""
-
-
-class Program:
-    """A student's, in a process of its own."""
-
-    def __init__(self, file: str, lab: str) -> None:
-        kept = {key: os.environ[key] for key in ("PATH", "PYTHONPATH") if key in os.environ}
-        self._process = subprocess.Popen(
-            [sys.executable, "-B", HERE / "lab.py", os.path.realpath(file), lab],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**kept, "OPENBLAS_NUM_THREADS": "1"},
-        )
-        assert self._process.stdin and self._process.stdout
-        self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
-        os.set_blocking(self._in, False)
-        os.read(self._out, 1)  # it is in its sandbox, or has ended
-        self._said, self._until = b"", 0.0
-
-    def __enter__(self) -> Program:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._process.kill()
-        self._process.wait()
-
-    def tell(self, readings: dict[str, Any]) -> None:
-        try:
-            line = json.dumps(readings).encode() + b"\n"
-            if os.write(self._in, line) < len(line):
-                raise BlockingIOError
-        except BlockingIOError:
-            raise Fault("drove without a look at the readings") from None
-        except BrokenPipeError:
-            pass  # it has ended: next() says how
-        self._until = time.monotonic() + PATIENCE
-
-    def next(self) -> tuple[str, Any]:
-        """What it said: ("drive", m/s and rad/s), ("result", (n, 3)), or ("end", why)."""
-        while b"\n" not in self._said:
-            left = max(0.0, self._until - time.monotonic())
-            if not select.select([self._out], [], [], left)[0]:
-                raise Fault(f"did not drive for {PATIENCE:g} s of real time")
-            came = os.read(self._out, 1 << 16)
-            if not came:
-                code = self._process.wait()
-                return "end", "" if code == 0 else f"ended with exit code {code}"
-            self._said += came
-            if len(self._said) > LONGEST:
-                raise Fault("said more than 1 MB at once")
-        if time.monotonic() > self._until:
-            raise Fault(f"did not drive for {PATIENCE:g} s of real time")
-        line, _, self._said = self._said.partition(b"\n")
-        return understood(line)
-
-
-def understood(line: bytes) -> tuple[str, Any]:
-    wrong = f"said {line[:40]!r}, which is neither a command nor a result"
-    try:
-        kind, what = json.loads(line)
-        if kind == "end" and isinstance(what, str):
-            return kind, what
-        numbers = np.array(what, dtype=float)
-    except (ValueError, TypeError, OverflowError, RecursionError):
-        raise Fault(wrong) from None
-    if kind == "result" and numbers.size == 0:
-        numbers = numbers.reshape(0, 3)
-    if not np.isfinite(numbers).all():
-        raise Fault(f"{kind!r:.20} holds what is not a finite number")
-    if kind == "drive" and numbers.shape == (2,):
-        return kind, numbers
-    if kind == "result" and numbers.shape == (len(numbers), 3) and len(numbers) <= MOST_POINTS:
-        return kind, numbers
-    raise Fault(wrong)
-
-
-def main(file: str, name: str) -> None:
-    handed, fault = np.zeros((0, 3)), ""
-    with ruedo.connect() as sim, Program(file, name) as program:
-        robot, steps = sim.robot("p3at"), round(0.1 / sim.step_size)
-        seen = sim.step(steps)
-        try:
-            program.tell({**readings(name, robot, seen), **given(name)})
-            while seen.time < LABS[name].seconds:
-                kind, what = program.next()
-                if kind == "end":
-                    fault = what
-                    break
-                if kind == "result":
-                    handed = what
-                    continue
-                seen = sim.step(steps, [robot.velocity_command(*what)])
-                program.tell(readings(name, robot, seen))
-        except Fault as error:
-            fault = str(error)
-        sim.step(steps, [drawn(handed, fault)])
-
-
-def readings(lab: str, robot: Any, seen: Any) -> dict[str, Any]:
-    odometry = seen.latest(robot.odometry)
-    told = {
-        "time": seen.time,
-        "odometry": [odometry.x, odometry.y, odometry.theta],
-        "ranges": seen.latest(robot.lrf).ranges.tolist(),
-        "sonar": seen.latest(robot.device("sonar_front")).ranges.tolist(),
-    }
-    if lab in ("umbmark", "mapping"):
-        pose = seen.latest(robot.pose)
-        told["pose"] = [pose.x, pose.y, pose.heading]
+def given(lab: str, seed: int) -> dict[str, Any]:
+    """Once, with the first readings."""
+    told: dict[str, Any] = {}
+    if lab in ("particle_filter", "planning"):
+        told["walls"] = walls(lab, seed)
+    if lab == "planning":
+        told["goal"] = goals(lab, seed)[0]
+    if lab == "many_robots":
+        told["goals"] = goals(lab, seed)
     return told
 
 
-def given(lab: str) -> dict[str, Any]:
-    """Once, with the first readings."""
-    seed = int(os.environ["RUEDO_SEED"])
-    return {"walls": walls(lab, seed)} if lab == "particle_filter" else {}
-
-
-def drawn(handed: np.ndarray, fault: str) -> ruedo.Command:
-    text = "".join(one if " " <= one <= "~" else "?" for one in fault[:300])
-    made = markers.message(LAYER, [markers.points(handed), markers.text(text, (0, 0))], "", 0)
-    return ruedo.Command("ruedo/markers", made.encode())
+def points(of: list[Wall]) -> np.ndarray:
+    """(n, 2) m, every 0.1 m along the walls."""
+    return np.concatenate([np.linspace(a, b, 1 + round(10 * math.dist(a, b))) for a, b in of])
 
 
 # ---- The marks.
 
 
 class Run(NamedTuple):
-    """way: true places (m), ten a second. handed: what was handed in, (n, 3)."""
+    """way: true places (m), ten a second. handed: what was handed in, (n, 3). ways: those of all
+    robots, by name.
+    """
 
     lab: str
     seed: int
@@ -237,6 +181,7 @@ class Run(NamedTuple):
     way: np.ndarray
     handed: np.ndarray
     fault: str
+    ways: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 def judge(log: str) -> float:
@@ -249,27 +194,32 @@ def judge(log: str) -> float:
 
 
 def read(log: str) -> Run:
-    header, way, seen, handed = None, [], -math.inf, None
+    header, handed = None, None
+    ways: dict[str, list[Point]] = {}
+    seen: dict[str, float] = {}
     for event in events(log):
         if event.channel == HEADER_CHANNEL:
             header = decode(lcmtypes.log_header_t, event.data)
-        elif event.channel == "p3at/pose" and event.timestamp >= seen + 100_000:
-            way.append(decode(lcmtypes.pose_t, event.data).pos[:2])
-            seen = event.timestamp
+        elif event.channel.endswith("/pose"):
+            name = event.channel.removesuffix("/pose")
+            if event.timestamp >= seen.get(name, -math.inf) + 100_000:
+                ways.setdefault(name, []).append(decode(lcmtypes.pose_t, event.data).pos[:2])
+                seen[name] = event.timestamp
         elif event.channel == APPLIED_CHANNEL:
             applied = decode(lcmtypes.applied_t, event.data)
             if applied.channel == "ruedo/markers":
                 handed = decode(lcmtypes.markers_t, applied.data).markers
-    if header is None or handed is None or not way:
+    if header is None or handed is None or "p3at" not in ways:
         raise Failed("the run did not come to its end")
     error = next(one for one in header.options if "odometry.track_error=" in one)
     return Run(
         header.world,
         header.seed,
         float(error.rpartition("=")[2]),
-        np.array(way),
+        np.array(ways["p3at"]),
         np.reshape(handed[0].points, (-1, 3)),
         handed[1].text,
+        {name: np.array(way) for name, way in ways.items()},
     )
 
 
@@ -354,6 +304,19 @@ def particle_filter(run: Run) -> None:
         raise Failed(f"believes to be {off:.2f} m from where it is")
 
 
+def at_goals(run: Run) -> None:
+    for name, goal in zip(LABS[run.lab].robots, goals(run.lab, run.seed)):
+        off = math.dist(run.ways[name][-1], goal)
+        if off > NEAR:
+            raise Failed(f"{name} ends {off:.2f} m from its goal")
+
+
+def vision(run: Run) -> None:
+    off = math.dist(run.way[-1], beacons(run.lab, run.seed)["red"])
+    if not abs(off - BEFORE) < NEAR:
+        raise Failed(f"ends {off:.2f} m from the red beacon, not {BEFORE:g}")
+
+
 def needs_way(run: Run, least: float) -> None:
     way = float(np.hypot(*np.diff(run.way, axis=0).T).sum())
     if way < least:
@@ -361,18 +324,23 @@ def needs_way(run: Run, least: float) -> None:
 
 
 class Lab(NamedTuple):
-    seconds: float  # that the program has
+    """seconds: that the program has. sees: readings beside those that all labs have."""
+
+    seconds: float
     judge: Callable[[Run], None]
+    sees: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ("p3at",)
 
 
 LABS = {
     "square": Lab(70.0, square),  # of 2 m, turning left, back to its start
     "wall_following": Lab(40.0, wall_following),  # along the walls of a room, 0.8 m away
     "sonar_avoidance": Lab(40.0, sonar_avoidance),  # around a room, by sonars alone
-    "umbmark": Lab(120.0, umbmark),  # hands in by how much odometry overestimates the track
-    "mapping": Lab(40.0, mapping),  # hands in the occupied places of the world
+    # hands in by how much odometry overestimates the track
+    "umbmark": Lab(120.0, umbmark, ("pose",)),
+    "mapping": Lab(40.0, mapping, ("pose",)),  # hands in the occupied places of the world
     "particle_filter": Lab(40.0, particle_filter),  # hands in where the robot is
+    "planning": Lab(90.0, at_goals, ("pose",)),  # to a goal, by a map that lacks three posts
+    "vision": Lab(60.0, vision, ("image",)),  # before the red of three beacons, by a camera
+    "many_robots": Lab(60.0, at_goals, ("poses",), TEAM),  # four robots exchange their places
 }
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

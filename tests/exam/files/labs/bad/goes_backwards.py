@@ -1,0 +1,3 @@
+def square(robot):
+    while True:
+        robot.drive(-0.3, 0.1)

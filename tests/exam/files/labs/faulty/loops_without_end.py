@@ -1,0 +1,3 @@
+def square(robot):
+    while True:
+        pass

@@ -1,0 +1,2 @@
+def square(robot):
+    square(robot)
