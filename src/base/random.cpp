@@ -8,6 +8,8 @@
 #include <bit>
 #include <cmath>
 
+#include "base/math/wide.h"
+
 namespace ruedo {
 namespace {
 
@@ -27,21 +29,21 @@ uint64_t absorb(uint64_t hash, std::string_view text) {
 // Natural logarithm of a positive normal number, within 1e-16 of the larger of 1 and |log x|. With
 // x = 2^e m, m in [sqrt 1/2, sqrt 2), log m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172:
 // eleven odd powers.
-double natural_log(double x) {
+inline double natural_log(double x) {
   const uint64_t bits = std::bit_cast<uint64_t>(x);
-  int exponent = static_cast<int>(bits >> 52) - 1023;
-  double m = std::bit_cast<double>((bits & 0xfffffffffffffu) | 0x3ff0000000000000u);  // [1, 2)
-  if (m > 1.4142135623730951) {
-    m *= 0.5;
-    ++exponent;
-  }
+  const uint64_t mantissa = bits & 0xfffffffffffff;
+  constexpr uint64_t kRootOfTwo = 0x6a09e667f3bcd;  // its mantissa
+  const uint64_t above = (kRootOfTwo - mantissa) >> 63;
+  const double m = std::bit_cast<double>((mantissa | 0x3ff0000000000000) - (above << 52));
   const double s = (m - 1.0) / (m + 1.0);
   const double s2 = s * s;
   constexpr double kOdd[10] = {1.0 / 21, 1.0 / 19, 1.0 / 17, 1.0 / 15, 1.0 / 13,
                                1.0 / 11, 1.0 / 9,  1.0 / 7,  1.0 / 5,  1.0 / 3};
   double tail = 0.0;
   for (const double c : kOdd) tail = tail * s2 + c;
-  const double e = exponent;
+  // The exponent becomes a double by way of its bits, which takes no more than SSE2 has.
+  const double e =
+      std::bit_cast<double>(((bits >> 52) + above) | 0x4330000000000000) - (0x1p52 + 1023.0);
   // ln 2 in two parts, the first with few bits, so that e times it is exact.
   return e * 6.93147180369123816490e-01 +
          (2.0 * s + (2.0 * s * s2 * tail + e * 1.90821492927058770002e-10));
@@ -99,21 +101,22 @@ inline double central_quantile(double q) {
   return q * polynomial(kA, r) / polynomial(kB, r);
 }
 
+// PPND16 where |q| > kCentre, by r, the root of -log of the smaller one of p and 1 - p.
+inline double tail_root(double p) {
+  const double other = 1.0 - p;
+  return std::sqrt(-natural_log(p < other ? p : other));
+}
+inline double near_tail_quantile(double r) {
+  return polynomial(kC, r - 1.6) / polynomial(kD, r - 1.6);
+}
+constexpr double kNearTail = 5.0;  // the largest r of that formula
+
 // The middle of one of 2^52 equal cells of (0, 1): never 0 or 1, and exactly symmetric about 1/2.
 // The cell's number becomes a double by way of its bits, which takes no more than SSE2 has.
 inline double cell_of(uint64_t high, uint64_t low) {
   const uint64_t cell = (high << 20) | (low >> 12);
   return (std::bit_cast<double>(cell | 0x4330000000000000u) - 0x1p52 + 0.5) * 0x1p-52;
 }
-
-// Compiled for wider registers, too, where the processor has them. There is no contraction to FMA:
-// the bits are the same.
-#if defined(__x86_64__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define RUEDO_WIDE [[gnu::target_clones("default", "avx2")]]
-#else
-#define RUEDO_WIDE
-#endif
 
 constexpr size_t kBlocks = 16;
 constexpr size_t kFewest = 8;  // draws that cost more singly
@@ -149,6 +152,29 @@ RUEDO_WIDE void draw_blocks(uint64_t key, uint64_t sample, uint64_t block, doubl
   for (size_t i = 0; i < 2 * kBlocks; ++i) values[i] = central_quantile(p[i] - 0.5);
 }
 
+// The quantiles of p in the tails; right for those that lie in the near ones.
+RUEDO_WIDE void near_tail_quantiles(size_t count, const double* p, double* values) {
+  for (size_t i = 0; i < count; ++i)
+    values[i] = std::copysign(near_tail_quantile(tail_root(p[i])), p[i] - 0.5);
+}
+
+// Draws that lie in the tails, 15 %, with their places among the values.
+struct Tails {
+  static constexpr size_t kMost = 128;
+  double p[kMost];
+  double* at[kMost];
+  size_t count = 0;
+
+  void settle() {
+    double drawn[kMost];
+    near_tail_quantiles(count, p, drawn);
+    constexpr double kFar = 2e-11;  // just above exp(-kNearTail^2)
+    for (size_t i = 0; i < count; ++i)
+      *at[i] = std::min(p[i], 1.0 - p[i]) < kFar ? normal_quantile(p[i]) : drawn[i];
+    count = 0;
+  }
+};
+
 }  // namespace
 
 std::array<uint32_t, 4> philox4x32(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key) {
@@ -168,9 +194,9 @@ std::array<uint32_t, 4> philox4x32(std::array<uint32_t, 4> counter, std::array<u
 double normal_quantile(double p) {
   const double q = p - 0.5;
   if (std::abs(q) <= kCentre) return central_quantile(q);
-  const double r = std::sqrt(-natural_log(q < 0.0 ? p : 1.0 - p));
-  const double x = r <= 5.0 ? polynomial(kC, r - 1.6) / polynomial(kD, r - 1.6)
-                            : polynomial(kE, r - 5.0) / polynomial(kF, r - 5.0);
+  const double r = tail_root(p);
+  const double x =
+      r <= kNearTail ? near_tail_quantile(r) : polynomial(kE, r - 5.0) / polynomial(kF, r - 5.0);
   return q < 0.0 ? -x : x;
 }
 
@@ -199,17 +225,24 @@ double RandomStream::gaussian() {
 void RandomStream::gaussians(std::span<double> values) {
   size_t done = 0;
   while (next_ != 4 && done < values.size()) values[done++] = gaussian();
-  // Two values a block. The centre's formula runs for all, in a loop without branches; the tails,
-  // 15 %, follow singly. A few that are left are worth the loop, too.
+  // Two values a block. The centre's formula runs for all, in a loop without branches, that of the
+  // tails for those that lie there. A few that are left are worth the loop, too.
+  Tails tails;
   while (values.size() - done >= kFewest) {
     const size_t count = std::min(values.size() - done, 2 * kBlocks) & ~size_t{1};
     double p[2 * kBlocks], drawn[2 * kBlocks];
     draw_blocks(key_, sample_, block_, p, drawn);
     block_ += count / 2;
-    for (size_t i = 0; i < count; ++i)
-      values[done + i] = std::abs(p[i] - 0.5) > kCentre ? normal_quantile(p[i]) : drawn[i];
+    for (size_t i = 0; i < count; ++i) {
+      values[done + i] = drawn[i];
+      tails.p[tails.count] = p[i];
+      tails.at[tails.count] = &values[done + i];
+      tails.count += std::abs(p[i] - 0.5) > kCentre;
+    }
+    if (tails.count + 2 * kBlocks > Tails::kMost) tails.settle();
     done += count;
   }
+  tails.settle();
   for (; done < values.size(); ++done) values[done] = gaussian();
 }
 

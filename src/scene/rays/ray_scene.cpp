@@ -1,13 +1,32 @@
-// The fast caster: trees find candidate boxes, the tests in double precision decide. A mover has
-// one box per body, so that updating a thousand robots means updating a thousand boxes.
+// The fast caster: trees and fans find candidate boxes, the tests in double precision decide. A
+// mover has one box per body, so that updating a thousand robots means updating a thousand boxes.
 #include "scene/rays/ray_scene.h"
 
-#include "scene/rays/ray_mover_tree.h"
+#include <array>
+
+#include "scene/rays/ray_box_tree.h"
 #include "scene/rays/ray_static.h"
 
 namespace ruedo::scene {
 
 namespace {
+
+// The box around a box, in the frame into which `into` leads.
+Box box_in(const IntoShape& into, const Box& box) {
+  const Vec3 center = into.point(0.5 * (box.lower + box.upper));
+  const Vec3 half = into.rotation.cwiseAbs() * (0.5 * (box.upper - box.lower));
+  return {center - half, center + half};
+}
+
+// Loads the origins and directions of these lanes (bits).
+void load(std::span<const Ray> rays, size_t packet, unsigned lanes, RayBatch& batch) {
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    const Ray& ray = rays[packet * kLanes + static_cast<size_t>(lane)];
+    batch.world.o[lane] = ray.origin;
+    batch.world.d[lane] = ray.direction;
+  }
+}
 
 class EmbreeRayScene : public RayScene {
  public:
@@ -28,16 +47,43 @@ class EmbreeRayScene : public RayScene {
                         FrameRays& body);
   void test_near(int index, unsigned lanes, const FrameRays& body, RayBatch& batch) const;
   void test_unbounded(const Mover& mover, unsigned lanes, RayBatch& batch) const;
+  // The rays of a cast, packet by packet: their hits so far.
+  struct CastPacket {
+    unsigned lanes;   // valid rays
+    unsigned beamed;  // those that come near movers
+    Box beam;
+    double t[kLanes];
+    int shape[kLanes], feature[kLanes];
+
+    void keep(const RayBatch& batch) {
+      std::copy_n(batch.t, kLanes, t);
+      std::copy_n(batch.shape, kLanes, shape);
+      std::copy_n(batch.feature, kLanes, feature);
+    }
+    void restore(RayBatch& batch) const {
+      std::copy_n(t, kLanes, batch.t);
+      std::copy_n(shape, kLanes, batch.shape);
+      std::copy_n(feature, kLanes, batch.feature);
+    }
+  };
+  static constexpr size_t kPackets = 32;      // that are cast together
+  static constexpr size_t kFewestOfFan = 24;  // rays for which a fan takes less time than Embree
+
   void test_bounded(size_t bounded, unsigned lanes, const Box& beam, RayBatch& batch) const;
-  void cast_batch(unsigned lanes, TreeQuery& query) const;
-  void write(const RayBatch& batch, int lane, Hit& hit) const;
+  bool meets(size_t bounded, const Box& beam, LinkIndex ignored_link) const;
+  void prepare(std::span<const Ray> rays, std::span<CastPacket> packets,
+               StaticRayScene::Within& within) const;
+  void cast_packets(std::span<const Ray> rays, std::span<CastPacket> packets,
+                    TreeQuery& query) const;
+  void cast_movers(std::span<const Ray> rays, std::span<CastPacket> packets, RayBatch& batch) const;
+  void write(const Ray& ray, const CastPacket& packet, int lane, Hit& hit) const;
 
   std::shared_ptr<const StaticRayScene> statics_;
   std::vector<Mover> bounded_, unbounded_;
   IndexedVector<BodyIndex, int> mover_of_body_;  // index into bounded_, or ~index into unbounded_
   // As RayTable::turning, at the snapshot's wheel angles.
   IndexedVector<TurningIndex, IntoShape> turning_;
-  MoverTree tree_;
+  BoxTree tree_;
 };
 
 EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics)
@@ -126,14 +172,23 @@ void EmbreeRayScene::test_unbounded(const Mover& mover, unsigned lanes, RayBatch
   for (const int index : statics_->table.bodies[mover.body]) test_near(index, lanes, body, batch);
 }
 
+// Whether the beam comes near one of the mover's shapes.
+bool EmbreeRayScene::meets(size_t bounded, const Box& beam, LinkIndex ignored_link) const {
+  const Mover& mover = bounded_[bounded];
+  const Box beam_B = box_in(mover.into, beam);
+  for (const int index : statics_->table.bodies[mover.body]) {
+    const RayShape& shape = statics_->table.shapes[index];
+    if (shape.link != ignored_link && shape.box_F.overlaps(beam_B)) return true;
+  }
+  return false;
+}
+
 // Most packets that come near a mover start on it and pass over its wheels: testing the beam's box
 // in the body's frame rejects all lanes at once, before any ray is transformed.
 void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& beam,
                                   RayBatch& batch) const {
   const Mover& mover = bounded_[bounded];
-  const Vec3 center = mover.into.point(0.5 * (beam.lower + beam.upper));
-  const Vec3 half = mover.into.rotation.cwiseAbs() * (0.5 * (beam.upper - beam.lower));
-  const Box beam_B{center - half, center + half};
+  const Box beam_B = box_in(mover.into, beam);
   FrameRays body;
   bool turned = false;
   for (const int index : statics_->table.bodies[mover.body]) {
@@ -149,55 +204,109 @@ void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& bea
   }
 }
 
-void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
-  statics_->cast(lanes, query);
-  for (const Mover& mover : unbounded_) test_unbounded(mover, lanes, query.batch);
-  tree_.visit(lanes, query.batch.world, query.batch.t,
-              [&](size_t mover, unsigned within, const Box& beam) {
-                test_bounded(mover, within, beam, query.batch);
-              });
+// Finds the valid rays, and what rays from one origin may meet.
+void EmbreeRayScene::prepare(std::span<const Ray> rays, std::span<CastPacket> packets,
+                             StaticRayScene::Within& within) const {
+  const Vec3& origin = rays[0].origin;
+  Box reach;
+  bool fan = rays.size() >= kFewestOfFan;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const Ray& ray = rays[i];
+    CastPacket& packet = packets[i / kLanes];
+    if (i % kLanes == 0) packet.lanes = 0;
+    if (!usable(ray)) continue;
+    packet.lanes |= 1u << (i % kLanes);
+    fan = fan && ray.origin == origin && ray.max_range <= kFarthest;
+    if (fan) reach.add(origin + ray.max_range * ray.direction);
+  }
+  if (!fan || reach.empty()) return;
+  reach.add(origin);
+  reach.grow(reach.rounding());
+  statics_->prepare(origin, reach, within);
+}
+
+void EmbreeRayScene::cast_packets(std::span<const Ray> rays, std::span<CastPacket> packets,
+                                  TreeQuery& query) const {
+  RayBatch& batch = query.batch;
+  StaticRayScene::Within within;
+  prepare(rays, packets, within);
+  for (size_t p = 0; p < packets.size(); ++p) {
+    CastPacket& packet = packets[p];
+    std::fill_n(batch.shape, kLanes, RayBatch::kNothing);
+    load(rays, p, packet.lanes, batch);
+    for (unsigned rest = packet.lanes; rest != 0; rest &= rest - 1) {
+      const int lane = std::countr_zero(rest);
+      batch.t[lane] = rays[p * kLanes + static_cast<size_t>(lane)].max_range;
+      if (statics_->has_meshes()) batch.world.shear[lane] = Shear(batch.world.d[lane]);
+    }
+    if (packet.lanes) statics_->cast(packet.lanes, within, query);
+    for (const Mover& mover : unbounded_) test_unbounded(mover, packet.lanes, batch);
+    packet.beamed = packet.lanes;
+    packet.beam = tree_.beam(packet.beamed, batch.world, batch.t);
+    packet.keep(batch);
+  }
+  cast_movers(rays, packets, batch);
+}
+
+// The movers near all packets are found at once: mostly there are none.
+void EmbreeRayScene::cast_movers(std::span<const Ray> rays, std::span<CastPacket> packets,
+                                 RayBatch& batch) const {
+  constexpr size_t kFew = 16;  // for more, each packet asks the tree
+  size_t near[kFew], count = 0;
+  Box beam;
+  for (const CastPacket& packet : packets)
+    if (packet.beamed) beam.add(packet.beam);
+  tree_.visit(beam, [&](size_t mover) {
+    if (count > kFew || !meets(mover, beam, batch.ignored_link)) return;
+    if (count < kFew) near[count] = mover;
+    ++count;
+  });
+  if (count == 0) return;
+  for (size_t p = 0; p < packets.size(); ++p) {
+    CastPacket& packet = packets[p];
+    if (!packet.beamed) continue;
+    load(rays, p, packet.beamed, batch);
+    packet.restore(batch);
+    const auto test = [&](size_t mover) { test_bounded(mover, packet.beamed, packet.beam, batch); };
+    if (count > kFew) {
+      tree_.visit(packet.beam, test);
+    } else {
+      for (size_t i = 0; i < count; ++i)
+        if (tree_.box(near[i]).overlaps(packet.beam)) test(near[i]);
+    }
+    packet.keep(batch);
+  }
 }
 
 void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits,
                           LinkIndex ignored_link) const {
+  thread_local std::array<CastPacket, kPackets> packets;
   TreeQuery query;
-  RayBatch& batch = query.batch;
-  batch.ignored_link = ignored_link;
-  for (size_t first = 0; first < rays.size(); first += kLanes) {
-    const int n = static_cast<int>(std::min<size_t>(kLanes, rays.size() - first));
-    unsigned lanes = 0;
-    for (int lane = 0; lane < n; ++lane) {
-      const Ray& ray = rays[first + static_cast<size_t>(lane)];
-      batch.shape[lane] = RayBatch::kNothing;
-      if (!usable(ray)) continue;
-      batch.world.o[lane] = ray.origin;
-      batch.world.d[lane] = ray.direction;
-      if (statics_->has_meshes()) batch.world.shear[lane] = Shear(ray.direction);
-      batch.t[lane] = ray.max_range;
-      lanes |= 1u << lane;
-    }
-    if (lanes) cast_batch(lanes, query);
-    for (int lane = 0; lane < n; ++lane)
-      write(batch, lane, hits[first + static_cast<size_t>(lane)]);
+  query.batch.ignored_link = ignored_link;
+  for (size_t first = 0; first < rays.size(); first += kPackets * kLanes) {
+    const auto some = rays.subspan(first, std::min(kPackets * kLanes, rays.size() - first));
+    cast_packets(some, std::span(packets).first((some.size() + kLanes - 1) / kLanes), query);
+    for (size_t i = 0; i < some.size(); ++i)
+      write(some[i], packets[i / kLanes], static_cast<int>(i % kLanes), hits[first + i]);
   }
 }
 
-void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
-  if (batch.shape[lane] == RayBatch::kNothing) {
+void EmbreeRayScene::write(const Ray& ray, const CastPacket& packet, int lane, Hit& hit) const {
+  if (packet.shape[lane] == RayBatch::kNothing) {
     hit = {};
     return;
   }
-  const RayShape& shape = statics_->table.shapes[batch.shape[lane]];
-  hit.range = batch.t[lane];
+  const RayShape& shape = statics_->table.shapes[packet.shape[lane]];
+  hit.range = packet.t[lane];
   hit.link = shape.link;
   hit.shape = shape.shape;
-  Vec3 o = batch.world.o[lane], d = batch.world.d[lane];
-  if (batch.feature[lane] == kInside) {
+  Vec3 o = ray.origin, d = ray.direction;
+  if (packet.feature[lane] == kInside) {
     hit.normal = -d;
     return;
   }
   if (shape.kind == world::Shape::mesh && !shape.body.valid()) {  // in the world's frame
-    const Vec3 normal = shape_normal(shape, batch.feature[lane], Vec3::Zero());
+    const Vec3 normal = shape_normal(shape, packet.feature[lane], Vec3::Zero());
     hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
     return;
   }
@@ -211,9 +320,9 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
   const IntoShape& into = shape.turning.valid() ? turning_[shape.turning] : shape.into;
   o = into.point(o);
   d = into.vector(d);
-  Vec3 normal = into.vector_back(shape_normal(shape, batch.feature[lane], o + hit.range * d));
+  Vec3 normal = into.vector_back(shape_normal(shape, packet.feature[lane], o + hit.range * d));
   if (body) normal = body->vector_back(normal);
-  hit.normal = normal.dot(batch.world.d[lane]) <= 0.0 ? normal : Vec3(-normal);
+  hit.normal = normal.dot(ray.direction) <= 0.0 ? normal : Vec3(-normal);
 }
 
 }  // namespace

@@ -29,13 +29,37 @@ StaticRayScene::StaticRayScene(const world::WorldModel& world, const world::Body
     }
   }
   has_meshes_ = !meshes.empty();
+  fan_tree_.build(boxes);
   tree_.build(device(), std::move(boxes), test_primitive, meshes);
   closed_tree_.build(device(), std::move(closed_boxes), test_closed);
 }
 
-void StaticRayScene::cast(unsigned lanes, TreeQuery& query) const {
-  for (const int index : unbounded_)
-    test_shape(shape(index), index, shape(index).into, lanes, query.batch.world, query.batch);
+void StaticRayScene::prepare(const Vec3& origin, const Box& reach, Within& within) const {
+  within.fan_known = !has_meshes_ && within.fan.collect(fan_tree_, origin, reach);
+  const Vec3 center = 0.5 * (reach.lower + reach.upper), half = 0.5 * (reach.upper - reach.lower);
+  for (size_t i = 0; i < std::min<size_t>(unbounded_.size(), 64); ++i) {
+    const RayShape& s = shape(unbounded_[i]);
+    if (s.kind != Shape::plane) continue;
+    const double height = s.normal.dot(s.into.point(center));
+    const double reached = s.into.vector_back(s.normal).cwiseAbs().dot(half) + reach.rounding() +
+                           1e-12 * s.into.translation.cwiseAbs().maxCoeff();
+    if (std::abs(height) > reached) within.unbounded &= ~(uint64_t{1} << i);
+  }
+}
+
+void StaticRayScene::cast(unsigned lanes, const Within& within, TreeQuery& query) const {
+  for (size_t i = 0; i < unbounded_.size(); ++i) {
+    const RayShape& s = shape(unbounded_[i]);
+    if (i >= 64 || (within.unbounded >> i & 1))
+      test_shape(s, unbounded_[i], s.into, lanes, query.batch.world, query.batch);
+  }
+  if (within.fan_known) {
+    within.fan.visit(lanes, query.batch, [&](size_t i) {
+      const RayShape& s = shape(bounded_[i]);
+      test_shape(s, bounded_[i], s.into, lanes, query.batch.world, query.batch);
+    });
+    return;
+  }
   query.owner = this;
   if (!closed_.empty()) cast_inside(lanes, query);
   tree_.cast(lanes, query);

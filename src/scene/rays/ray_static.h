@@ -2,6 +2,7 @@
 // over static shapes. Internal to src/scene.
 #pragma once
 
+#include "scene/rays/ray_fan.h"
 #include "scene/rays/ray_scene.h"
 #include "scene/rays/ray_table.h"
 
@@ -73,8 +74,16 @@ class StaticRayScene {
   RTCDevice device() const { return device_.get(); }
   // rays in the world's frame then need their shear
   bool has_meshes() const { return has_meshes_; }
+  // What rays may meet, as far as it is known before they are cast.
+  struct Within {
+    bool fan_known = false;
+    RayFan fan;
+    uint64_t unbounded = ~uint64_t{0};  // bit i: the rays may meet the i-th, from 64 on all
+  };
+  // Of rays from one origin; reach: around them up to their maximum range.
+  void prepare(const Vec3& origin, const Box& reach, Within& within) const;
   // Static shapes, for the lanes (bits) of query.batch.
-  void cast(unsigned lanes, TreeQuery& query) const;
+  void cast(unsigned lanes, const Within& within, TreeQuery& query) const;
 
  private:
   static void test_primitive(const RTCIntersectFunctionNArguments* arguments);
@@ -84,6 +93,7 @@ class StaticRayScene {
 
   std::vector<int> unbounded_, bounded_, closed_;  // indices into table.shapes
   RayTree tree_, closed_tree_;
+  BoxTree fan_tree_;  // of bounded_
   bool has_meshes_ = false;
 };
 

@@ -1,8 +1,8 @@
-// The tree over the movers' boxes: our own binary tree in double precision, because refitting it
-// takes a twentieth of the time that Embree needs (which rebuilds user geometry, whatever quality
-// is requested).
+// A tree over boxes, of movers or of static shapes: our own binary tree in double precision,
+// because refitting it takes a twentieth of the time that Embree needs (which rebuilds user
+// geometry, whatever quality is requested).
 //
-// Results do not depend on the tree's shape: every mover whose box a ray meets is visited.
+// Results do not depend on the tree's shape: every box that meets the beam is visited.
 #pragma once
 
 #include <vector>
@@ -11,28 +11,31 @@
 
 namespace ruedo::scene {
 
-class MoverTree {
+class BoxTree {
  public:
-  // One box per mover, numbered from 0; no ray meets an empty box.
+  // Boxes are numbered from 0; no ray meets an empty box.
   void build(std::vector<Box> boxes);
-  Box& box(size_t mover) { return boxes_[mover]; }
+  Box& box(size_t i) { return boxes_[i]; }
+  const Box& box(size_t i) const { return boxes_[i]; }
   void refit();  // after boxes have changed
 
-  // Calls visit(mover, lanes, beam) for movers whose boxes meet `beam`, the box around the segments
-  // of these lanes (bits) up to t inside the box of all movers. Whether a lane meets the mover's
-  // own box is tested by meeting().
-  template <class Visit>
-  void visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const;
+  // The box around the segments of these lanes (bits) up to t inside the box of all boxes; the
+  // lanes without such a segment are taken from `lanes`.
+  Box beam(unsigned& lanes, const FrameRays& rays, const double* t) const;
 
-  // The lanes (bits) that meet the mover's box before t[lane].
-  unsigned meeting(size_t mover, unsigned lanes, const FrameRays& rays, const double* t) const;
+  // Calls visit(i) for the boxes that meet `beam`.
+  template <class Visit>
+  void visit(const Box& beam, Visit visit) const;
+
+  // The lanes (bits) that meet the box before t[lane].
+  unsigned meeting(size_t i, unsigned lanes, const FrameRays& rays, const double* t) const;
 
  private:
   // In depth-first order: the first child of node i is i + 1.
   struct Node {
     Box box;
     int second = -1;  // index of the second child; -1: a leaf
-    int mover = -1;   // of a leaf
+    int leaf = -1;    // of a leaf: its box
   };
   void build_nodes();
   void split(int* first, int* last);
@@ -44,14 +47,11 @@ class MoverTree {
   double built_area_ = 0.0;
 };
 
-template <class Visit>
-void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const {
-  if (nodes_.empty()) return;
-  // Rays of one packet that run close together.
-  const Box& root = nodes_[0].box;
+inline Box BoxTree::beam(unsigned& lanes, const FrameRays& rays, const double* t) const {
   Box beam;
   unsigned within = 0;
-  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+  for (unsigned rest = nodes_.empty() ? 0 : lanes; rest != 0; rest &= rest - 1) {
+    const Box& root = nodes_[0].box;
     const int lane = std::countr_zero(rest);
     const Vec3 &o = rays.o[lane], &d = rays.d[lane];
     double enter = 0.0, exit = t[lane];
@@ -65,8 +65,14 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
     beam.add(end);
     within |= 1u << lane;
   }
-  if (within == 0) return;
-  beam.grow(root.rounding());
+  lanes = within;
+  if (within) beam.grow(nodes_[0].box.rounding());
+  return beam;
+}
+
+template <class Visit>
+void BoxTree::visit(const Box& beam, Visit visit) const {
+  if (nodes_.empty()) return;
   int stack[64];  // median splits make the tree as deep as the binary logarithm of its leaves
   int depth = 0;
   stack[depth++] = 0;
@@ -75,7 +81,7 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
     const Node& node = nodes_[index];
     if (!node.box.overlaps(beam)) continue;
     if (node.second < 0) {
-      visit(static_cast<size_t>(node.mover), within, beam);
+      visit(static_cast<size_t>(node.leaf));
       continue;
     }
     stack[depth++] = node.second;
@@ -83,9 +89,9 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
   }
 }
 
-inline unsigned MoverTree::meeting(size_t mover, unsigned lanes, const FrameRays& rays,
-                                   const double* t) const {
-  Box box = boxes_[mover];
+inline unsigned BoxTree::meeting(size_t i, unsigned lanes, const FrameRays& rays,
+                                 const double* t) const {
+  Box box = boxes_[i];
   box.grow(box.rounding());
   unsigned meeting = 0;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {

@@ -1,17 +1,17 @@
-#include "scene/rays/ray_mover_tree.h"
+#include "scene/rays/ray_box_tree.h"
 
 #include <numeric>
 
 namespace ruedo::scene {
 
-void MoverTree::build(std::vector<Box> boxes) {
+void BoxTree::build(std::vector<Box> boxes) {
   boxes_ = std::move(boxes);
   order_.resize(boxes_.size());
   nodes_.reserve(2 * boxes_.size());
   build_nodes();
 }
 
-void MoverTree::build_nodes() {
+void BoxTree::build_nodes() {
   nodes_.clear();
   if (boxes_.empty()) return;
   std::iota(order_.begin(), order_.end(), 0);
@@ -19,16 +19,16 @@ void MoverTree::build_nodes() {
   built_area_ = fit();
 }
 
-// Splits the movers in half by their centres along the longest side.
-void MoverTree::split(int* first, int* last) {
+// Splits the boxes in half by their centres along the longest side.
+void BoxTree::split(int* first, int* last) {
   const size_t index = nodes_.size();
   nodes_.emplace_back();
   if (last - first == 1) {
-    nodes_[index].mover = *first;
+    nodes_[index].leaf = *first;
     return;
   }
-  const auto center = [&](int mover) -> Vec3 {
-    const Box& box = boxes_[mover];
+  const auto center = [&](int i) -> Vec3 {
+    const Box& box = boxes_[i];
     return box.empty() ? Vec3::Zero() : Vec3(0.5 * box.lower + 0.5 * box.upper);
   };
   Box centers;
@@ -46,12 +46,12 @@ void MoverTree::split(int* first, int* last) {
 }
 
 // Bottom-up; returns the sum of the inner boxes' surfaces.
-double MoverTree::fit() {
+double BoxTree::fit() {
   double area = 0.0;
   for (size_t i = nodes_.size(); i-- > 0;) {
     Node& node = nodes_[i];
     if (node.second < 0) {
-      node.box = boxes_[node.mover];
+      node.box = boxes_[node.leaf];
       if (!node.box.empty()) node.box.grow(node.box.rounding());
       continue;
     }
@@ -64,7 +64,7 @@ double MoverTree::fit() {
   return area;
 }
 
-void MoverTree::refit() {
+void BoxTree::refit() {
   // A tree is rebuilt when its boxes have grown too much.
   if (fit() > 2.0 * built_area_) build_nodes();
 }
