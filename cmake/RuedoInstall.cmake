@@ -62,6 +62,11 @@ if(TARGET ruedo_python_engine_stable)
   install(TARGETS ruedo_python_engine_stable LIBRARY DESTINATION ${python}/ruedo)
 endif()
 
+# The course, the labs and the other examples, which `ruedo course` copies; from a build folder, too.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/clients/python/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
+  PATTERN __pycache__ EXCLUDE PATTERN .ipynb_checkpoints EXCLUDE)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/clients/python/examples ${PROJECT_BINARY_DIR}/examples SYMBOLIC)
+
 # The licences of everything that is installed.
 set(copyright ${PROJECT_BINARY_DIR}/licences/copyright)
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/licences)

@@ -1,18 +1,24 @@
 """Hooks of MkDocs: what makes pages that are written for a repository's browser a site.
 
-Pages at the top of the repository join those of docs/, links to sources become plain text, and the
-commands' page is what `ruedo COMMAND --help` prints. RUEDO is the program.
+Pages at the top of the repository join those of docs/, links to sources become plain text, the
+course is made of its notebooks, and the commands' page is what `ruedo COMMAND --help` prints. RUEDO
+is the program.
 """
 
 import os
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts/site"))
+
+import course  # noqa: E402
+
 FROM_THE_TOP = {
     "CONTRIBUTING.md": "contributing.md",
     "SECURITY.md": "security.md",
@@ -52,6 +58,10 @@ def on_files(files, config):
             File.generated(config, name, content=(ROOT / source).read_text(encoding="utf-8"))
         )
     files.append(File.generated(config, "commands.md", content=commands_page()))
+    for name, content in course.pages():
+        files.append(File.generated(config, name, content=content))
+    for name, picture in course.pictures():
+        files.append(File.generated(config, name, abs_src_path=str(picture)))
     return files
 
 
@@ -65,6 +75,8 @@ def target_of(page, link):
     file = (folder / path).resolve()
     if file.parent == ROOT and file.name in FROM_THE_TOP:
         inside = FROM_THE_TOP[file.name]
+    elif file == course.COURSE / "README.md":
+        inside = "course/index.md"
     elif file.is_file() and file.is_relative_to(ROOT / "docs"):
         inside = str(file.relative_to(ROOT / "docs"))
     elif not file.exists() and not top:

@@ -41,7 +41,7 @@ PAGES = [
         if str(p.relative_to(ROOT / "docs")) not in APPENDIX
     ),
 ]
-MOST_BYTES = 200_000
+MOST_BYTES = 200_000  # without the course, which is a book of its own, made of notebooks
 READERS = ["Student", "ROS developer", "Engineer with CI", "Researcher who trains", "Maintainer"]
 
 
@@ -156,6 +156,20 @@ def test_each_client_has_its_reference(site, page, needs):
     if needs != "python3":
         folder = page.split("/")[1]
         assert f"{folder}/index.html" in parsed(site / "api/others.html").links
+
+
+def test_the_course_has_a_page_of_each_evening(site):
+    """With its formulas, which no library draws, its pictures and its program."""
+    evenings = sorted((ROOT / "clients/python/examples/course").glob("evening_*.ipynb"))
+    assert len(evenings) == 10
+    for notebook in evenings:
+        text = (site / f"course/{notebook.stem}.html").read_text(encoding="utf-8")
+        assert '<math xmlns="http://www.w3.org/1998/Math/MathML"' in text and "$" not in text, (
+            notebook
+        )
+        assert "The idea" in text and "Beyond" in text
+    first = (site / "course/evening_1_odometry.html").read_text(encoding="utf-8")
+    assert "rc::launch" in first and "Ruedo" in first and "images/odometry.svg" in first
 
 
 def test_search_has_all_pages(site):

@@ -9,7 +9,9 @@ from conftest import SOURCE
 
 def test_notebook_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    notebook = json.loads((SOURCE / "clients/python/examples/fit/fit.ipynb").read_text())
+    notebook = json.loads(
+        (SOURCE / "clients/python/examples/course/evening_9_fit.ipynb").read_text()
+    )
     names = {}
     for cell in notebook["cells"]:
         if cell["cell_type"] == "code":

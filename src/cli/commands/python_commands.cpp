@@ -1,5 +1,5 @@
-// ruedo campaign, hunt, why, fit, retrace and docs: written in Python, in the package `ruedo` of
-// this installation, which this hands over to.
+// ruedo campaign, hunt, why, fit, retrace, docs and course: written in Python, in the package
+// `ruedo` of this installation, which this hands over to.
 #include "cli/support/commands.h"
 #include "cli/support/python.h"
 
@@ -45,6 +45,9 @@ void add_python_commands(CLI::App& app, Action& chosen) {
       {"retrace", "drive a simulated robot along the path, or by the commands, of a real one",
        "ruedo.fit.cli", "'ruedo[fit]'"});
   add(app, chosen, {"docs", "open the documentation in a browser", "ruedo.docs", "'ruedo[docs]'"});
+  add(app, chosen,
+      {"course", "copy the course of eight evenings: notebooks, labs and their marking",
+       "ruedo.course", "'ruedo'"});
 }
 
 const RegisterCommand kRegister{56, add_python_commands};
