@@ -55,6 +55,7 @@ NOT_RUN = {
     ("performance.md", "unshare"): "the same",
     ("platforms.md", "packaging/try_in_debian.sh"): "tests/package/test_debian.py",
     ("platforms.md", "mvn"): "tests/package/test_maven.py",
+    ("platforms.md", "python3 -m venv"): INSTALLS,
     ("platforms.md", "scripts/sysroot"): "scripts/test --nightly does it, for golden.aarch64",
     ("platforms.md", "scripts/release"): "needs podman, and its images from elsewhere",
     ("plugins.md", "find_package"): "the core of docs/example-plugin: tests/package/test_plugin.py",
