@@ -1,7 +1,7 @@
 """How well `ruedo fit` finds known errors: drawn sets of three robots in three worlds.
 
 Run as PYTHONPATH=build/release/python .venv/bin/python benchmarks/fit_known_truth.py [SETS [PART]].
-PART: odometry (a second of CPU a set), ranges (ten) or motion (twenty). Prints a Markdown table for
+PART: odometry (a second of CPU a set), ranges (ten), motion (ten) or lag (four). Prints a Markdown table for
 docs/reality.md; Ctrl-C ends it with the sets done so far.
 """
 
@@ -17,14 +17,17 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests/fit"))
 
-from drives import SQUARE, drive
+from drives import SQUARE, drive, integrated
 from ruedo import World
 from ruedo.fit import read
 from ruedo.fit.fitting import fit, read_robot
+from ruedo.fit.motion import fit_motion
+from ruedo.fit.recording import Commands
 
 ROBOTS = ("p3at", "p3dx", "crawler")
-PARTS = ("odometry", "ranges", "motion")
+PARTS = ("odometry", "ranges", "motion", "lag")
 WORLDS = ("empty", "room", "hall")
+MOCAP = 5e-4  # m and rad, of a pose of the path that motion is fitted to
 
 
 def build(name):
@@ -62,16 +65,34 @@ def draw(rng):
     return drive_, rng.uniform(0.0, 0.3), beams
 
 
-def truth_of(part, robot, drive_, delay, beams):
+def draw_motion(rng):
+    """Speeds (m/s, rad/s): what settings are added for motion, and the dead zone."""
+    limits = {
+        "velocity.max_speed": rng.uniform(0.35, 0.45),
+        "velocity.max_turn_rate": rng.uniform(0.5, 0.7),
+    }
+    return limits, (rng.uniform(0.03, 0.06), rng.uniform(0.04, 0.1))
+
+
+def truth_of_motion(drive_, delay, dead):
+    return {
+        "speed: delay": delay,
+        "turn rate: delay": delay,
+        "speed: acceleration": drive_["velocity.acceleration"],
+        "speed: deceleration": drive_["velocity.deceleration"],
+        "turn rate: acceleration": drive_["velocity.turn_acceleration"],
+        "turn rate: deceleration": drive_["velocity.turn_acceleration"],
+        "speed: limit": drive_["velocity.max_speed"],
+        "turn rate: limit": drive_["velocity.max_turn_rate"],
+        "speed: gain": 1.0,
+        "turn rate: gain": 1.0,
+        "speed: dead zone": dead[0],
+        "turn rate: dead zone": dead[1],
+    }
+
+
+def truth_of(part, robot, drive_, beams):
     """The values that a fit should find, by name."""
-    if part == "motion":
-        return {
-            "speed: delay": delay,
-            "turn rate: delay": delay,
-            "speed: acceleration": drive_["velocity.acceleration"],
-            "speed: deceleration": drive_["velocity.deceleration"],
-            "turn rate: acceleration": drive_["velocity.turn_acceleration"],
-        }
     if part == "ranges":
         return {
             "range noise": beams["lrf.lidar.noise.stddev"],
@@ -106,24 +127,47 @@ def one_set(number, part, folder):
     drive_, delay, beams = draw(rng)
     log = folder / f"{number}.lcm"
     nominal = read_robot(robot)
-    sees = part == "ranges"
+    sees, moves = part == "ranges", part == "motion"
     off = ("camera", "sonar", "lidar") if sees else ("camera", "sonar", "lrf", "lidar")
+    limits, dead = draw_motion(rng)
+    course = {"legs": 64, "speeds": (0.3, 0.6), "course": SQUARE}
+    if part == "odometry":  # at rest between legs: Thrun's alphas are those of pure motions
+        course |= {"legs": 96, "pause": 6}
+    if moves:
+        drive_ |= limits
+        course |= {"speeds": (0.4, 0.6), "quarters": (4, 14), "factors": (0.05, 1.3), "dead": dead}
     for attempt in range(20):
+        sent = []
         if not drive(
             log, robot, {**drive_, **(beams if sees else {})}, number + 1000 * attempt,
-            world=str(place), legs=64, speeds=(0.3, 0.6), course=SQUARE, off=off,
-            near=world != "empty",
+            world=str(place), off=off, near=world != "empty", sent=sent, **course,
         ):  # fmt: skip
             break
     recording = read(log)
-    recording.commands.time -= delay
-    if part != "motion":
-        recording.commands = None
-    answer = fit([recording], nominal)
-    found = {one.name: one for part in answer.parts.values() for one in part}
     log.unlink()
-    true = truth_of(part, nominal, drive_, delay, beams)
+    recording.commands = None
+    if moves:
+        time, ahead, turn = np.array(sent).T
+        recording.commands = Commands(time - delay, np.stack([ahead, 0 * ahead, turn], axis=1))
+        recording.truth.pose += rng.normal(0, MOCAP, recording.truth.pose.shape)
+        found = fit_motion(recording)
+        true = truth_of_motion(drive_, delay, dead)
+    else:
+        found = [one for part in fit([recording], nominal).parts.values() for one in part]
+        true = truth_of(part, nominal, drive_, beams)
+    found = {one.name: one for one in found}
     return world, [(name, value, found[name]) for name, value in true.items() if name in found]
+
+
+def lag_set(number):
+    """As one_set(), of a drive with a lag, which Ruedo's robots do not have."""
+    rng = np.random.default_rng(number)
+    delay, lag = rng.uniform(0.01, 0.3), rng.uniform(0.02, 0.3)
+    rise, fall = rng.uniform(0.3, 1.5, 2)
+    found = {one.name: one for one in fit_motion(integrated(number, delay, rise, fall, lag))}
+    true = {"delay": delay, "acceleration": rise, "deceleration": fall, "lag": lag}
+    rows = [(f"{axis}: {k}", v) for axis in ("speed", "turn rate") for k, v in true.items()]
+    return "made", [(name, value, found[name]) for name, value in rows]
 
 
 def main(sets, part):
@@ -132,7 +176,10 @@ def main(sets, part):
     with tempfile.TemporaryDirectory() as folder:
         try:
             for number in range(sets):
-                world, values = one_set(number, part, Path(folder))
+                if part == "lag":
+                    world, values = lag_set(number)
+                else:
+                    world, values = one_set(number, part, Path(folder))
                 worlds.append(world)
                 for name, true, one in values:
                     rows.setdefault(name, []).append((true, one))

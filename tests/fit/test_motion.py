@@ -6,50 +6,10 @@ from pathlib import Path as File
 
 import numpy as np
 import pytest
-from conftest import BUILD
-
-assert BUILD
-
 import ruedo
+from drives import integrated
 from ruedo.fit.motion import fit_motion
 from ruedo.fit.recording import Commands, Path, Recording
-
-STEP_S = 0.001
-
-
-def recorded(
-    seed: int, delay: float, rise: float, fall: float, lag: float, *, seconds=40.0, rate=50.0
-) -> Recording:
-    """A drive on a plane by commands at chance times, integrated by Euler's method at 1 ms."""
-    draw = np.random.default_rng(seed)
-    when = np.cumsum(np.concatenate([[0.5], draw.uniform(0.4, 2.0, 2 * int(seconds))]))
-    when = when[when < seconds - 2]
-    value = np.zeros((len(when), 3))
-    value[:, 0], value[:, 2] = draw.uniform(-0.6, 0.7, len(when)), draw.uniform(-1, 1, len(when))
-    time = np.arange(0, seconds, STEP_S)
-    last = np.searchsorted(when, time - delay, side="right") - 1
-    wanted = np.where(last[:, None] >= 0, value[np.maximum(last, 0)], 0.0)
-    speed = np.zeros((len(time), 3))
-    for k in (0, 2):
-        now = 0.0
-        for i, target in enumerate(wanted[:, k].tolist()):
-            change = (target - now) * min(STEP_S / lag, 1.0)
-            faster = change * now >= 0
-            limit = (rise if faster else fall) * STEP_S
-            now += min(max(change, -limit), limit)
-            speed[i, k] = now
-    heading = np.cumsum(speed[:, 2]) * STEP_S
-    x = np.cumsum(speed[:, 0] * np.cos(heading)) * STEP_S
-    y = np.cumsum(speed[:, 0] * np.sin(heading)) * STEP_S
-    every = round(1 / rate / STEP_S)
-    pose = np.stack([x, y, heading], axis=1)[::every]
-    pose = pose + draw.normal(0, [2e-4, 2e-4, 2e-4], pose.shape)
-    return Recording(
-        File("drive.csv"),
-        "CSV",
-        truth=Path(time[::every] + STEP_S, pose, "motion capture"),
-        commands=Commands(when, value),
-    )
 
 
 def by_name(recording: Recording) -> dict:
@@ -62,10 +22,10 @@ def test_delay_limits_and_lag_are_found():
     for seed in range(3):
         delay, lag = draw.uniform(0.01, 0.3), draw.uniform(0.02, 0.15)
         rise, fall = draw.uniform(0.3, 1.5, 2)
-        found = by_name(recorded(seed, delay, rise, fall, lag))
+        found = by_name(integrated(seed, delay, rise, fall, lag))
         for axis in ("speed", "turn rate"):
-            assert found[f"{axis}: delay"].value == pytest.approx(delay, abs=0.005)
-            assert found[f"{axis}: acceleration"].value == pytest.approx(rise, rel=0.05)
+            assert found[f"{axis}: delay"].value == pytest.approx(delay, abs=0.001)
+            assert found[f"{axis}: acceleration"].value == pytest.approx(rise, rel=0.01)
             assert found[f"{axis}: deceleration"].value == pytest.approx(fall, rel=0.05)
             assert found[f"{axis}: lag"].value == pytest.approx(lag, rel=0.1, abs=0.005)
             for what, true in (("delay", delay), ("acceleration", rise), ("deceleration", fall)):
@@ -75,11 +35,34 @@ def test_delay_limits_and_lag_are_found():
 
 
 def test_limits_beyond_the_commands_are_not_estimated():
-    found = by_name(recorded(3, 0.05, 1e3, 1e3, 0.2))
+    found = by_name(integrated(3, 0.05, 1e3, 1e3, 0.2))
     assert found["speed: acceleration"].value is None
     assert found["speed: lag"].value == pytest.approx(0.2, rel=0.05)
-    few = recorded(3, 0.05, 0.5, 0.5, 0.1, seconds=6)
+    few = integrated(3, 0.05, 0.5, 0.5, 0.1, seconds=6)
     assert "at least" in fit_motion(few)[0].why
+
+
+def test_dead_zone_and_speed_limit():
+    found = by_name(integrated(11, 0.1, 1.2, 1.2, 0.05, dead=0.15, limit=0.45, seconds=60))
+    for axis in ("speed", "turn rate"):
+        zone = found[f"{axis}: dead zone"]
+        assert zone.low <= 0.15 <= zone.high
+        assert found[f"{axis}: limit"].value == pytest.approx(0.45, rel=0.01)
+        assert found[f"{axis}: gain"].value == pytest.approx(1.0, rel=0.01)
+    found = by_name(integrated(11, 0.1, 1.2, 1.2, 0.05))
+    assert "moves it" in found["speed: dead zone"].why
+    assert "no command of up to 0.6" in found["speed: limit"].why
+
+
+def test_path_in_other_units_or_at_rest():
+    recording = integrated(3, 0.05, 0.5, 0.5, 0.1)
+    recording.truth.pose[:, :2] *= 1000
+    said = by_name(recording)
+    assert "times as far as the commands say" in said["speed: delay, acceleration and lag"].why
+    assert said["turn rate: delay"].value == pytest.approx(0.05, abs=0.005)
+    recording.truth.pose[:] = 0
+    said = by_name(recording)
+    assert said["speed: delay, acceleration and lag"].why == "the robot does not move"
 
 
 def test_a_simulated_robot_has_the_limits_of_its_file():
@@ -87,7 +70,6 @@ def test_a_simulated_robot_has_the_limits_of_its_file():
     delay, draw = 0.085, np.random.default_rng(1)
     time, poses, when, value = [], [], [], []
     with ruedo.Engine(ruedo.World().robot("p3at")) as engine:
-        h = engine.step_size  # a step has the speed of its end throughout
         for turn in range(45):
             ahead, about = draw.uniform(-0.5, 0.5), draw.uniform(-0.7, 0.7)
             when.append(engine.time - delay)
@@ -103,6 +85,6 @@ def test_a_simulated_robot_has_the_limits_of_its_file():
     found = by_name(Recording(File("run.lcm"), "LCM log", truth=path, commands=commands))
     limits = (("speed", 0.3, 0.6), ("turn rate", 1.74, 1.74))  # those of its file
     for axis, rise, fall in limits:
-        assert found[f"{axis}: delay"].value == pytest.approx(delay - h / 2, abs=0.005)
+        assert found[f"{axis}: delay"].value == pytest.approx(delay, abs=0.001)
         assert found[f"{axis}: acceleration"].value == pytest.approx(rise, rel=0.05)
         assert found[f"{axis}: deceleration"].value == pytest.approx(fall, rel=0.05)

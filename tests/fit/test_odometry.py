@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from conftest import ruedo
 from drives import drive
-from ruedo.fit import FitError, read
+from ruedo.fit import FitError, fitting, read
 from ruedo.fit.drives import Drive, integrate
 from ruedo.fit.odometry import fit_odometry
 from ruedo.fit.recording import Geometry, Path, Recording, Wheels
+from ruedo.fit.resume import Kept
 
 FORWARD = {  # ways of the wheels (m) for 1 m ahead, 1 m left, 1 rad, by hand; lever 0.2 m
     "omni3": [[-0.8660254, 0.8660254, 0], [-0.5, -0.5, 1], [-0.2, -0.2, -0.2]],
@@ -163,3 +164,28 @@ def test_odometry_alone_gives_the_ratio(tmp_path):
     recording.wheels = None
     found = fit_odometry([recording], Geometry("differential", 0.111, 0.394))
     assert 0.394 / found.parameters[2] - 1 == pytest.approx(0.031, abs=2e-3)
+
+
+def test_an_interrupted_fit_goes_on(tmp_path, monkeypatch):
+    """Stages that were done are not repeated, and the values are those of a fit in one go."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    log = tmp_path / "drive.log"
+    log.write_text("of these bytes\n")
+    recording = noiseless("differential", (0.0512, 0.0493, 0.208))
+    recording.geometry = Geometry("differential", 0.05, 0.2)
+    recording.streams = {"encoders": recording.wheels.time}
+    once = fitting.fit([recording]).as_dict()
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as broken:
+        broken.setattr(fitting, "fit_timing", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            fitting.fit([recording], kept=Kept([log], "options"))
+    monkeypatch.setattr(fitting, "fit_odometry", interrupted)  # is not called again
+    assert fitting.fit([recording], kept=Kept([log], "options")).as_dict() == once
+    assert not list((tmp_path / "ruedo/fit").iterdir())
+    for other in (Kept([log], "other options"), Kept([__file__], "options")):
+        with pytest.raises(KeyboardInterrupt):
+            fitting.fit([recording], kept=other)

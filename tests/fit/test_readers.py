@@ -139,6 +139,12 @@ def test_bags(tmp_path, kind):
         ("a.csv", "time,x,y\n0,1,2\n1,2,3\n", "a.csv:1: 'x' without 'theta'"),
         ("a.csv", "time,left,right\n0,1,2\n1,2\n", "a.csv:3: 2 columns, the first row has 3"),
         ("a.csv", "x,y,theta\n0,1,2\n", "no column 'time'"),
+        ("a.csv", "time,left,right\n" + "5,1,2\n" * 9, "time is 5 s in all rows"),
+        (
+            "a.csv",
+            "time,left,right\n" + "".join(f"{50 * k},{k},{k}\n" for k in range(9)),
+            "a reading of its wheels every 50 s; allowed are times in s",
+        ),
         (
             "7_run-01.csv",
             "0,0,0,0,0,0\n0,0,0,0,36,18\n",

@@ -243,6 +243,7 @@ def _check_folder(file: str | None) -> None:
 def _fit(arguments: argparse.Namespace) -> int:
     from .fitting import fit, read_robot, save
     from .read import read
+    from .resume import Kept
 
     if arguments.output and not arguments.robot:
         raise UsageError("-o needs --robot: the model into which the values are written")
@@ -250,7 +251,9 @@ def _fit(arguments: argparse.Namespace) -> int:
     _check_folder(arguments.report)
     robot = read_robot(arguments.robot) if arguments.robot else None
     recordings = [read(one, arguments.of) for one in arguments.LOG]
-    answer = fit(recordings, robot, arguments.mount)
+    files = [*arguments.LOG, *([robot.file] if robot else [])]
+    kept = Kept(files, (arguments.of, arguments.mount))
+    answer = fit(recordings, robot, arguments.mount, kept)
     if arguments.output:
         assert robot is not None
         save(answer, robot, File(arguments.output))

@@ -23,6 +23,7 @@ from .odometry import OdometryFit, fit_odometry
 from .progress import track
 from .rangefinder import BeamModel, fit_rangefinder
 from .recording import Array, Geometry, Recording, body_steps
+from .resume import Kept
 from .robot_file import Setting, write_fitted
 from .streams import fit_imu, fit_timing
 
@@ -116,10 +117,12 @@ def fit(
     recordings: Sequence[Recording],
     robot: Robot | None = None,
     mount: Sequence[float] | None = None,
+    kept: Kept | None = None,
 ) -> Fit:
     """Everything that the logs determine. mount: x, y (m), heading (rad) of the range finder on the
-    robot; None: the model's, or the origin where the log gives the range finder's own poses. Raises
-    FitError where that is nothing.
+    robot; None: the model's, or the origin where the log gives the range finder's own poses. kept:
+    where the results of each stage are kept until the last one is done. Raises FitError where
+    nothing is determined.
     """
     answer = Fit(list(recordings))
     for one in recordings:
@@ -130,8 +133,14 @@ def fit(
         lambda: _fit_motion(answer),
         lambda: _fit_streams(answer),
     ]
-    for stage in track(stages, "fitting"):
+    done, found = (kept.load() if kept else None) or (0, {})
+    vars(answer).update(found)
+    for number, stage in track(list(enumerate(stages, 1))[done:], "fitting"):
         stage()
+        if kept:
+            kept.save((number, {k: v for k, v in vars(answer).items() if k != "recordings"}))
+    if kept:
+        kept.drop()
     if not answer.parts:
         raise FitError("; ".join(answer.remarks))
     return answer
@@ -250,8 +259,14 @@ def _fit_streams(answer: Fit) -> None:
 
 
 def _fit_motion(answer: Fit) -> None:
-    motion = fit_motion(answer.recordings[0])
+    first = answer.recordings[0]
+    motion = fit_motion(first)
     if not motion:
+        if first.commands is None and (first.wheels or first.odometry):
+            answer.remarks.append(
+                f"delay, acceleration and limits are not fitted: this {first.kind} has no velocity "
+                "commands"
+            )
         return
     answer.parts["Motion"] = motion
     source = f"fitted to {answer.recordings[0].file.name}, 95 %: "
@@ -259,6 +274,8 @@ def _fit_motion(answer: Fit) -> None:
         "speed: acceleration": "acceleration",
         "speed: deceleration": "deceleration",
         "turn rate: acceleration": "turn_acceleration",
+        "speed: limit": "max_speed",
+        "turn rate: limit": "max_turn_rate",
     }
     for one in motion:
         if one.value is not None and one.name in elements:

@@ -226,6 +226,9 @@ def fit_rangefinder(
         else:
             why = "it is too small beside the others, or all surfaces are met head-on"
             estimates.append(Estimate(name, None, why=why))
+    farthest = float(np.quantile(found.reach, 0.99))
+    why = "surfaces farther away are needed"
+    estimates.append(Estimate(f"noise beyond {farthest:.2g} m", None, why=why))
     estimates.append(Estimate("bias of the range", None, why="surfaces are the range finder's own"))
     share = max(model.outliers, 0.0)
     std = np.sqrt(share * (1 - share) / len(found.residual))

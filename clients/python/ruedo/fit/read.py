@@ -5,19 +5,22 @@ from __future__ import annotations
 import gzip
 from pathlib import Path as File
 
+import numpy as np
+
 from ..files import open_regular
 from ..logs import EVENT
 from .bags import read_bag
 from .carmen import LINES, read_carmen
 from .errors import FitError
 from .lcm_log import read_lcm
-from .recording import Recording
+from .recording import Array, Recording
 from .tables import COLUMNS, read_csv, read_encoder_table
 
 KINDS = (
     "CARMEN log, LCM log, ROS 1 or 2 bag (.bag, sqlite3, MCAP), encoder table with its metadata, "
     "CSV with a header"
 )
+_MOST_GAP_S = 5.0  # between readings of wheels
 
 
 def read(path: str | File, robot: str = "") -> Recording:
@@ -26,7 +29,24 @@ def read(path: str | File, robot: str = "") -> Recording:
 
     Raises FitError for a file that is not a log or is damaged, OSError for what cannot be opened.
     """
-    file = File(path)
+    recording = _read(File(path), robot)
+    for name in ("odometry", "wheels", "imu"):
+        if (stream := getattr(recording, name)) is not None:
+            _check_times(recording.file, name, stream.time)
+    return recording
+
+
+def _check_times(file: File, name: str, time: Array) -> None:
+    """Raises FitError where a stream that follows a drive is too slow for one."""
+    gap = float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+    if gap > _MOST_GAP_S:
+        raise FitError(
+            f"{file}: a reading of its {name} every {gap:.3g} s; allowed are times in s: "
+            "these may be in another unit (ms, us, ns)"
+        )
+
+
+def _read(file: File, robot: str) -> Recording:
     if file.is_dir():
         if not (file / "metadata.yaml").exists():
             raise FitError(f"{file}: a folder without metadata.yaml; that of a ROS 2 bag has one")

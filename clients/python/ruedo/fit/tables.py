@@ -171,6 +171,8 @@ def read_csv(file: File) -> Recording:
         values = np.stack([table[one] for one in columns], axis=1)
         kept = np.isfinite(values).all(axis=1) & np.isfinite(table["time"])
         time, values = sorted_rows(table["time"][kept], values[kept])
+        if len(time) == 1 and kept.sum() > 1:
+            raise FitError(f"{file}: time is {time[0]:g} s in all rows; it must increase")
         recording.streams[name] = time
         return time, values
 
