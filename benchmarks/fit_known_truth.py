@@ -1,8 +1,8 @@
 """How well `ruedo fit` finds known errors: drawn sets of three robots in three worlds.
 
 Run as PYTHONPATH=build/release/python .venv/bin/python benchmarks/fit_known_truth.py [SETS [PART]].
-PART: odometry (a second of CPU a set), ranges (ten), motion (ten) or lag (four). Prints a Markdown table for
-docs/reality.md; Ctrl-C ends it with the sets done so far.
+PART: odometry (two seconds of CPU a set), ranges (twenty), motion or lag (two). Prints a Markdown
+table for docs/reality.md; Ctrl-C ends it with the sets done so far.
 """
 
 from __future__ import annotations

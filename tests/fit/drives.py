@@ -66,7 +66,7 @@ def integrated(
     seed: int, delay: float, rise: float, fall: float, lag: float, *, seconds=40.0, rate=50.0,
     dead=0.0, limit=np.inf,
 ) -> Recording:  # fmt: skip
-    """A drive on a plane by commands at chance times, integrated by Euler's method at 1 ms."""
+    """A drive on a plane by commands at chance times, integrated in steps of 1 ms."""
     draw = np.random.default_rng(seed)
     when = np.cumsum(np.concatenate([[0.5], draw.uniform(0.4, 2.0, 2 * int(seconds))]))
     when = when[when < seconds - 2]
@@ -80,7 +80,7 @@ def integrated(
     for k in (0, 2):
         now = 0.0
         for i, target in enumerate(wanted[:, k].tolist()):
-            change = (target - now) * min(_STEP_S / lag, 1.0)
+            change = (target - now) * -np.expm1(-_STEP_S / lag)
             faster = change * now >= 0
             limit = (rise if faster else fall) * _STEP_S
             now += min(max(change, -limit), limit)
