@@ -76,14 +76,15 @@ def integrated(
     last = np.searchsorted(when, time - delay, side="right") - 1
     wanted = np.where(last[:, None] >= 0, value[np.maximum(last, 0)], 0.0)
     wanted = np.where(np.abs(wanted) > dead, wanted, 0.0).clip(-limit, limit)
+    share = -float(np.expm1(-_STEP_S / lag))
     speed = np.zeros((len(time), 3))
     for k in (0, 2):
         now = 0.0
         for i, target in enumerate(wanted[:, k].tolist()):
-            change = (target - now) * -np.expm1(-_STEP_S / lag)
+            change = (target - now) * share
             faster = change * now >= 0
-            limit = (rise if faster else fall) * _STEP_S
-            now += min(max(change, -limit), limit)
+            most = (rise if faster else fall) * _STEP_S
+            now += min(max(change, -most), most)
             speed[i, k] = now
     heading = np.cumsum(speed[:, 2]) * _STEP_S
     x = np.cumsum(speed[:, 0] * np.cos(heading)) * _STEP_S

@@ -178,7 +178,10 @@ class _Axis:
 
     def jacobian(self, x: Array) -> Array:
         """(N, 6), by central differences over _STEPS, which pass over the kinks of limits."""
-        low, high = np.maximum(x - np.diag(_STEPS), _LOW), np.minimum(x + np.diag(_STEPS), self.high)
+        low, high = (
+            np.maximum(x - np.diag(_STEPS), _LOW),
+            np.minimum(x + np.diag(_STEPS), self.high),
+        )
         return np.stack(
             [
                 (self.residuals(b) - self.residuals(a)) / (b[k] - a[k])
@@ -204,7 +207,12 @@ class _Axis:
     def _descend(self, x: Array) -> Array:
         x = np.clip(x, _LOW + 1e-9, self.high - 1e-9)
         found = least_squares(
-            self.residuals, x, self.jacobian, (_LOW, self.high), x_scale=_STEPS, max_nfev=40,
+            self.residuals,
+            x,
+            self.jacobian,
+            (_LOW, self.high),
+            x_scale=_STEPS,
+            max_nfev=40,
             tr_solver="lsmr",
         )
         return np.asarray(found.x, float)
