@@ -341,6 +341,118 @@ TEST(Articulated, ACradlePassesTheSpeedOn) {
     EXPECT_LT(w.position("m" + std::to_string(i) + "/l").z() - 0.2, 1e-3) << i;
 }
 
+// Pages on a common axis through y, which `spine` carries, and of which each lies beside the next:
+// dozens of contacts within one mechanism.
+class Book {
+ public:
+  static constexpr int kPages = 24;
+  // from its axis, m
+  static constexpr double kInner = 0.1, kLength = 0.3, kCentre = kInner + kLength / 2;
+
+  // Page i is turned about y by i times that angle, and lies that much higher than page i - 1.
+  static std::string pages(const std::string& spine, double turned, double higher, double mu) {
+    std::string text = "<self_collide>true</self_collide>";
+    for (int i = 0; i < kPages; ++i) {
+      const std::string n = std::to_string(i), friction = std::to_string(mu);
+      text += "<link name='p" + n + "'><pose>0 0 " + std::to_string(i * higher) + " 0 " +
+              std::to_string(-i * turned) + " 0</pose>" +
+              inertial(std::to_string(kCentre) + " 0 0 0 0 0", mass(i), 0.004 * mass(i),
+                       0.008 * mass(i), 0.011 * mass(i)) +
+              "<collision name='c'><pose>" + std::to_string(kCentre) +
+              " 0 0 0 0 0</pose><geometry><box><size>" + std::to_string(kLength) +
+              " 0.2 0.01</size></box></geometry><surface><friction><ode><mu>" + friction +
+              "</mu><mu2>" + friction + "</mu2></ode></friction></surface></collision></link>" +
+              hinge("j" + n, spine, "p" + n, "0 1 0");
+    }
+    return text;
+  }
+  // A heavy one lies on light ones.
+  static double mass(int page) { return page == kPages - 1 ? 5.0 : 0.05 * (1 + page % 3); }
+};
+
+// The moments of all pages about their axes, which only the floor bears, are those of their
+// weights: forces between pages cancel.
+TEST(Articulated, PagesOfABookBearEachOther) {
+  for (const int64_t step_us : {1000, 5000}) {
+    World w(kPlane + "<model name='m'><pose>0 0 0.005 0 0 0</pose>" +
+                Book::pages("world", 0.0, 0.0101, 0.0) + "</model>",
+            step_us);
+    w.run(1.0);
+    double weights = 0.0, borne = 0.0;
+    for (int i = 0; i < Book::kPages; ++i) weights += 10 * Book::mass(i) * Book::kCentre;
+    Snapshot snapshot;
+    w.physics.read(snapshot);
+    size_t within = 0;
+    for (const Contact& contact : snapshot.contacts) {
+      EXPECT_LT(contact.depth, 2e-4);
+      if (contact.body_a.valid() && contact.body_b.valid())
+        ++within;
+      else
+        borne += contact.force * contact.position.x();
+    }
+    EXPECT_GT(within, 32u);
+    EXPECT_NEAR(borne, weights, 2e-3 * weights) << step_us;
+  }
+}
+
+// A fan that closes while it flies keeps its momenta, and gains no energy.
+TEST(Articulated, ABookThatClosesInFlightKeepsItsMomenta) {
+  constexpr double kSpine = 0.4;
+  World w("<model name='m'><pose>0 0 50 0 0 0</pose><link name='spine'>" +
+              inertial("0 0 0 0 0 0", kSpine, 0.002, 0.002, 0.002) + "</link>" +
+              Book::pages("spine", 0.12, 0.0, 1.0) + "</model>",
+          1000);
+  const Vec3 start(1.0, -2.0, 3.0), spin(0.5, 0.2, -0.8);
+  const auto each = [&](const auto& act) {
+    act(w.body("m/spine"), kSpine);
+    for (int i = 0; i < Book::kPages; ++i) act(w.body("m/p" + std::to_string(i)), Book::mass(i));
+  };
+  each([&](BodyIndex body, double) { w.physics.set_twist(body, {start, spin}); });
+  for (int i = 0; i < Book::kPages; ++i)  // they close towards the middle
+    w.physics.set_twist(w.body("m/p" + std::to_string(i)),
+                        {start, spin + Vec3(0, 0.2 * (i - Book::kPages / 2.0), 0)});
+  struct Sums {
+    double mass = 0.0, energy = 0.0;
+    Vec3 centre = Vec3::Zero(), momentum = Vec3::Zero(), turning = Vec3::Zero();
+  };
+  const auto sums = [&] {
+    Sums sums;
+    each([&](BodyIndex body, double mass) {
+      const Vec3 place = w.physics.center_of_mass(body);
+      const Twist& twist = w.physics.twist(body);
+      const Vec3 v = twist.linear + twist.angular.cross(place - w.physics.pose(body).translation);
+      const Vec3 turning = w.physics.inertia(body) * twist.angular;
+      sums.mass += mass;
+      sums.centre += mass * place;
+      sums.momentum += mass * v;
+      sums.turning += turning + mass * place.cross(v);
+      sums.energy +=
+          0.5 * mass * v.squaredNorm() + 0.5 * turning.dot(twist.angular) + 10 * mass * place.z();
+    });
+    sums.centre /= sums.mass;
+    sums.turning -= sums.centre.cross(sums.momentum);
+    return sums;
+  };
+  w.run(0.005);  // the joints take what the twists above do not fit
+  const Sums first = sums();
+  Sums last = first;
+  size_t most = 0;
+  for (int i = 1; i <= 1500; ++i) {
+    w.physics.step();
+    const Sums now = sums();
+    EXPECT_LT(now.energy, last.energy + 1e-3) << i;
+    last = now;
+    Snapshot snapshot;
+    w.physics.read(snapshot);
+    most = std::max<size_t>(most, snapshot.contacts.size());
+    for (const Contact& contact : snapshot.contacts) EXPECT_LT(contact.depth, 1e-3) << i;
+  }
+  EXPECT_GT(most, 32u);
+  EXPECT_LT((last.momentum - first.momentum - 1.5 * first.mass * Vec3(0, 0, -10)).norm(),
+            1e-6 * first.mass);
+  EXPECT_LT((last.turning - first.turning).norm(), 0.01 * first.turning.norm());
+}
+
 // Two weights below each other on vertical sliders, with dampers of any size: each sinks at (weight
 // that it bears - friction) / damping, relative to what it hangs on, and stays where the friction
 // bears all.

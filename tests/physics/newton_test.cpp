@@ -8,6 +8,7 @@
 
 #include "physics/base/envelope.h"
 #include "physics/base/newton.h"
+#include "physics/base/reduced_matrix.h"
 
 namespace ruedo::physics {
 namespace {
@@ -48,6 +49,66 @@ TEST(Envelope, SolvesLikeADenseFactor) {
   envelope.solve(x);
   const Eigen::VectorXd expected = dense.llt().solve(right);
   for (int i = 0; i < 6; ++i) EXPECT_LT((x[i] - expected.segment<6>(6 * i)).norm(), 1e-12);
+}
+
+// Two trees of bodies and a free one, with random ways and blocks between any two of them.
+TEST(ReducedMatrix, SolvesLikeADenseFactor) {
+  constexpr int kBodies = 10;  // the first one takes no part
+  constexpr int kOn[kBodies] = {0, 0, 1, 2, 1, 4, 0, 6, 6, 0};
+  constexpr int kWays[kBodies] = {0, 6, 1, 1, 3, 0, 3, 1, 1, 6};
+  using Six = NewtonMatrix::Six;
+  using Block = NewtonMatrix::Block;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  const auto number = [&] { return any(random); };
+  ReducedMatrix reduced;
+  reduced.begin(kBodies);
+  // Six velocities of each body are ways times rates.
+  Eigen::MatrixXd twists = Eigen::MatrixXd::Zero(6 * kBodies, 22), scaled = twists;
+  int way = 0;
+  for (int body = 1; body < kBodies; ++body) {
+    const Block scale = Block::NullaryExpr(number);
+    reduced.add(body, kOn[body], scale);
+    twists.middleRows<6>(6 * body) = twists.middleRows<6>(6 * kOn[body]);
+    for (int k = 0; k < kWays[body]; ++k) {
+      const Six along = Six::NullaryExpr(number);
+      reduced.add_way(along);
+      twists.block<6, 1>(6 * body, way++) = along;
+    }
+    scaled.middleRows<6>(6 * body) = scale * twists.middleRows<6>(6 * body);
+  }
+  ASSERT_EQ(way, 22);
+  const Eigen::MatrixXd S = scaled.bottomRows(6 * kBodies - 6);
+  reduced.prepare();
+  ASSERT_EQ(reduced.size(), kBodies - 1u);
+  ASSERT_EQ(reduced.ways(), 22u);
+
+  const std::vector<std::pair<int, int>> pairs = {{1, 3}, {3, 5}, {5, 7}, {7, 9}, {8, 7}, {2, 4}};
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Identity(S.rows(), S.rows());
+  reduced.set_identity();
+  for (const auto& [a, b] : pairs) {
+    const int p = reduced.place(a), q = reduced.place(b);
+    const Block A = Block::NullaryExpr(number), B = Block::NullaryExpr(number);
+    reduced.block(p, p) += A * A.transpose();
+    reduced.block(q, q) += B * B.transpose();
+    reduced.block(std::max(p, q), std::min(p, q)) +=
+        p > q ? Block(A * B.transpose()) : Block(B * A.transpose());
+    Eigen::MatrixXd both = Eigen::MatrixXd::Zero(S.rows(), 6);
+    both.middleRows<6>(6 * p) = A;
+    both.middleRows<6>(6 * q) = B;
+    dense += both * both.transpose();
+  }
+  reduced.factor();
+  for (const bool all : {true, false}) {  // with the blocks, and without
+    Eigen::VectorXd right(S.rows());
+    std::vector<Six> x(kBodies - 1);
+    for (int i = 0; i < kBodies - 1; ++i) x[i] = right.segment<6>(6 * i) = Six::NullaryExpr(number);
+    all ? reduced.solve(x) : reduced.project(x);
+    const Eigen::MatrixXd H = all ? Eigen::MatrixXd(S.transpose() * dense * S) : S.transpose() * S;
+    const Eigen::VectorXd expected = S * H.llt().solve(S.transpose() * right);
+    for (int i = 0; i < kBodies - 1; ++i)
+      EXPECT_LT((x[i] - expected.segment<6>(6 * i)).norm(), 1e-9 * expected.norm()) << i;
+  }
 }
 
 // A tower of points: each stands on the one below, the first one on something immovable.

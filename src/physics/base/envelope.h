@@ -7,18 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "physics/base/bullet.h"
-#include "ruedo/index.h"
+#include "physics/base/newton_matrix.h"
 
 namespace ruedo::physics {
 
-using PlaceIndex = Index<struct PlaceKind>;  // of a body in the elimination order
-
-class Envelope {
+class Envelope final : public NewtonMatrix {
  public:
-  using Block = Eigen::Matrix<double, 6, 6>;
-  using Six = Eigen::Matrix<double, 6, 1>;
-
   Envelope();
 
   // Orders bodies 0 .. takes_part.size() - 1, of which those that take part are coupled by pairs.
@@ -26,17 +20,16 @@ class Envelope {
   double prepare(const std::vector<char>& takes_part,
                  const std::vector<std::pair<int, int>>& pairs);
 
-  PlaceIndex place(int body) const { return places_[body]; }  // none: it takes no part
-  size_t size() const { return order_.size(); }
-  int body(size_t place) const { return order_[place]; }
-
-  void set_identity();
-  // row >= column, of a pair.
-  Block& block(int row, int column) {
+  PlaceIndex place(int body) const override { return places_[body]; }
+  size_t size() const override { return order_.size(); }
+  int body(size_t place) const override { return order_[place]; }
+  void set_identity() override;
+  Block& block(int row, int column) override {
     return blocks_[start_[row] + static_cast<size_t>(column - first_[row])];
   }
-  void factor();  // in place
-  void solve(std::vector<Six>& x);
+  void factor() override;
+  void solve(std::vector<Six>& x) override;
+  void project(std::vector<Six>&) override {}  // all is allowed
 
  private:
   void put_in_order(const std::vector<char>& takes_part,

@@ -60,7 +60,7 @@ Newton::Newton() {
   contacts_.reserve(kRows);
 }
 
-double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs) {
+void Newton::set_bodies(const SolverBodies& bodies) {
   bodies_.assign(bodies.size(), {});
   movable_.assign(bodies.size(), 0);
   for (size_t i = 1; i < bodies.size(); ++i) {
@@ -69,7 +69,62 @@ double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<i
     bodies_[i].root_mass = bodies[i].inverse_mass.cwiseSqrt();
     bodies_[i].root_inertia = root_of(bodies[i].inverse_inertia);
   }
-  return matrix_.prepare(movable_, pairs);
+}
+
+double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs) {
+  set_bodies(bodies);
+  matrix_ = &envelope_;
+  return envelope_.prepare(movable_, pairs);
+}
+
+void Newton::begin_trees(const SolverBodies& bodies) {
+  set_bodies(bodies);
+  matrix_ = &reduced_;
+  reduced_.begin(bodies.size());
+}
+
+// From a twist about the point that is `arm` before the centre of mass.
+Newton::Block Newton::scale_of(int body, const Vec3& arm) const {
+  const Body& of = bodies_[body];
+  Block scale = Block::Zero();
+  for (int i = 0; i < 3; ++i) {
+    if (of.root_mass[i] == 0.0) continue;
+    scale(i, 3 + i) = 1.0 / of.root_mass[i];
+    const Vec3 turned = arm.cross(Vec3::Unit(i));  // w x arm, component i
+    for (int k = 0; k < 3; ++k) scale(i, k) = turned[k] / of.root_mass[i];
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (of.root_inertia(i, i) == 0.0) continue;
+    Vec3 rest = Vec3::Unit(i);
+    for (int k = 0; k < i; ++k)
+      rest -= of.root_inertia(i, k) * Vec3(scale.block<1, 3>(3 + k, 0).transpose());
+    scale.block<1, 3>(3 + i, 0) = rest.transpose() / of.root_inertia(i, i);
+  }
+  return scale;
+}
+
+void Newton::add_body(int body, int on, const Vec3& arm) {
+  reduced_.add(body, on, scale_of(body, arm));
+}
+
+// Bodies without joints follow.
+void Newton::end_trees() {
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    const int body = static_cast<int>(i);
+    if (!movable_[i] || reduced_.place(body).valid()) continue;
+    add_body(body, 0, Vec3::Zero());
+    for (int k = 0; k < 3; ++k) {
+      Six along = Six::Zero();
+      along[3 + k] = bodies_[i].root_mass[k];
+      if (along[3 + k] != 0.0) reduced_.add_way(along);
+    }
+    for (int k = 0; k < 3; ++k) {
+      Six along = Six::Zero();
+      along.head<3>() = bodies_[i].root_inertia.col(k);
+      if (along[k] != 0.0) reduced_.add_way(along);
+    }
+  }
+  reduced_.prepare();
 }
 
 void Newton::begin() {
@@ -88,8 +143,8 @@ Newton::Six Newton::scaled(int body, const Vec3& linear, const Vec3& angular) co
 void Newton::add(Row& row) {
   Bound& bound = bounds_.emplace_back();
   bound.row = &row;
-  bound.a = matrix_.place(row.a);
-  bound.b = matrix_.place(row.b);
+  bound.a = matrix_->place(row.a);
+  bound.b = matrix_->place(row.b);
   bound.lower = row.lower;
   bound.upper = row.upper;
   bound.J_a = scaled(row.a, row.linear_a, row.angular_a);
@@ -105,8 +160,8 @@ void Newton::add(Row& row, size_t contact, double lever) {
 
 size_t Newton::add(Row& normal, Row& along, Row& across, double friction, double friction2) {
   Contact& contact = contacts_.emplace_back();
-  contact.a = matrix_.place(normal.a);
-  contact.b = matrix_.place(normal.b);
+  contact.a = matrix_->place(normal.a);
+  contact.b = matrix_->place(normal.b);
   const bool rubs =
       friction > 0.0 && friction2 > 0.0 && along.inverse > 0.0 && across.inverse > 0.0;
   contact.friction[0] = friction;
@@ -144,7 +199,7 @@ void Newton::start(const SolverBodies& bodies) {
       contact.missing[k] = (k == 0 ? 1.0 : contact.friction[k - 1]) * missing(*contact.rows[k]);
     contact.slip = length_of(contact.missing[1], contact.missing[2]);
   }
-  y_.assign(matrix_.size(), Six::Zero());
+  y_.assign(matrix_->size(), Six::Zero());
   step_ = y_;
   set_weights(kYieldsFirst);
   set_bounds();
@@ -311,18 +366,18 @@ bool Newton::any_slips() const {
 }
 
 void Newton::add_block(PlaceIndex a, PlaceIndex b, const auto& of_a, const auto& of_b) {
-  if (a.valid()) matrix_.block(a, a) += of_a.transpose().lazyProduct(of_a);
-  if (b.valid()) matrix_.block(b, b) += of_b.transpose().lazyProduct(of_b);
+  if (a.valid()) matrix_->block(a, a) += of_a.transpose().lazyProduct(of_a);
+  if (b.valid()) matrix_->block(b, b) += of_b.transpose().lazyProduct(of_b);
   if (!a.valid() || !b.valid()) return;
   if (a > b) {
-    matrix_.block(a, b) += of_a.transpose().lazyProduct(of_b);
+    matrix_->block(a, b) += of_a.transpose().lazyProduct(of_b);
   } else {
-    matrix_.block(b, a) += of_b.transpose().lazyProduct(of_a);
+    matrix_->block(b, a) += of_b.transpose().lazyProduct(of_a);
   }
 }
 
 void Newton::assemble() {
-  matrix_.set_identity();
+  matrix_->set_identity();
   for (Bound& bound : bounds_) {
     bound.was_active = bound.active;
     if (!bound.active) continue;
@@ -349,7 +404,7 @@ void Newton::assemble() {
 
 void Newton::find_step() {
   for (size_t i = 0; i < step_.size(); ++i) step_[i] = -gradient_[i];
-  matrix_.solve(step_);
+  matrix_->solve(step_);
   slope_of_step_ = square_of_step_ = 0.0;
   for (size_t i = 0; i < step_.size(); ++i) {
     slope_of_step_ += y_[i].dot(step_[i]);
@@ -407,11 +462,13 @@ Newton::Errors Newton::take_multipliers(bool first) {
 }
 
 // m/s
-double Newton::furthest(const std::vector<Six>& change) const {
+double Newton::furthest(const std::vector<Six>& change) {
+  allowed_ = change;
+  matrix_->project(allowed_);
   double most = 0.0;
-  for (size_t i = 0; i < change.size(); ++i) {
-    const Body& body = bodies_[matrix_.body(i)];
-    most = std::max(most, change[i].norm() * body.root_mass.maxCoeff());
+  for (size_t i = 0; i < allowed_.size(); ++i) {
+    const Body& body = bodies_[matrix_->body(i)];
+    most = std::max(most, allowed_[i].norm() * body.root_mass.maxCoeff());
   }
   return most;
 }
@@ -461,7 +518,7 @@ bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
     }
     if (!factored || any_slips() || !same_zones()) {
       assemble();
-      matrix_.factor();
+      matrix_->factor();
       factored = true;
     }
     find_step();

@@ -3,18 +3,20 @@
 // efficient semismooth Newton augmented Lagrangian method", 2018).
 //
 // Each row acts like a stiff spring within its bounds, in addition to its previous impulse: a
-// convex problem in the bodies' velocities, six unknowns per body. The springs of a contact pull to
-// the nearest point of Coulomb's cone (A. Castro, F. Permenter, X. Han, "An unconstrained convex
-// formulation of compliant contact", 2022). By that alone a contact that slips would also open, as
-// fast as it slips times the friction; so its normal velocity is aimed lower by that much (V.
-// Acary, F. Cadoux, "Applications of an existence result for the Coulomb friction problem", 2013).
-// The solution gives the next impulses and aims, and stiffer springs, until nothing changes.
+// convex problem in the bodies' velocities: six unknowns per body, or, in trees of joints, one for
+// each degree of freedom. The springs of a contact pull to the nearest point of Coulomb's cone (A.
+// Castro, F. Permenter, X. Han, "An unconstrained convex formulation of compliant contact", 2022).
+// By that alone a contact that slips would also open, as fast as it slips times the friction; so
+// its normal velocity is aimed lower by that much (V. Acary, F. Cadoux, "Applications of an
+// existence result for the Coulomb friction problem", 2013). The solution gives the next impulses
+// and aims, and stiffer springs, until nothing changes.
 #pragma once
 
 #include <utility>
 #include <vector>
 
 #include "physics/base/envelope.h"
+#include "physics/base/reduced_matrix.h"
 #include "physics/base/rows.h"
 
 namespace ruedo::physics {
@@ -22,10 +24,21 @@ namespace ruedo::physics {
 class Newton {
  public:
   Newton();
+  Newton(const Newton&) = delete;  // matrix_ points into it
+  Newton& operator=(const Newton&) = delete;
 
   // Sets up a new island: which of its bodies are coupled by rows. Returns the cost of a
   // factorization, in multiplications.
   double prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs);
+
+  // The same for an island of trees of joints, whose joints hold exactly: between begin_trees and
+  // end_trees all of their bodies are added, each after that on which it hangs, with its ways: the
+  // twists (angular, linear) that its joint allows, about a point of the tree, from which `arm`
+  // leads to the centre of mass.
+  void begin_trees(const SolverBodies& bodies);
+  void add_body(int body, int on, const Vec3& arm);
+  void add_way(const Eigen::Matrix<double, 6, 1>& along) { reduced_.add_way(along); }
+  void end_trees();
 
   void begin();
   // Adds a row with fixed bounds. Here and below, rows that can move nothing are left out: their
@@ -83,6 +96,8 @@ class Newton {
   };
 
   Six scaled(int body, const Vec3& linear, const Vec3& angular) const;
+  void set_bodies(const SolverBodies& bodies);
+  Block scale_of(int body, const Vec3& arm) const;
   void start(const SolverBodies& bodies);
   void set_weights(double yields);
   void set_bounds();
@@ -106,13 +121,15 @@ class Newton {
     double yielded = 0.0, slipped = 0.0;
   };
   Errors take_multipliers(bool first);
-  double furthest(const std::vector<Six>& change) const;
+  double furthest(const std::vector<Six>& change);
   void give(SolverBodies& bodies) const;
 
   std::vector<Body> bodies_;  // as the solver's
   std::vector<char> movable_;
-  Envelope matrix_;
-  std::vector<Six> y_, gradient_, step_;  // by place, as L^-1 v
+  Envelope envelope_;
+  ReducedMatrix reduced_;
+  NewtonMatrix* matrix_ = &envelope_;
+  std::vector<Six> y_, gradient_, step_, allowed_;  // by place, as L^-1 v
   std::vector<Bound> bounds_;
   std::vector<Contact> contacts_;
   double yields_ = 0.0;  // softness of the springs, relative to the rows' responses

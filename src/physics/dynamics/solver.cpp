@@ -32,7 +32,10 @@ constexpr double kPushTolerance_m_s = 1e-5;
 constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 30;
 // With friction, sweeps do not converge while few contacts bear the whole load.
 constexpr int kSweepsBeforeSharing = 10;
-constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
+// Before Newton, of mechanisms: their joints are solved directly anyway. In reduced coordinates it
+// is faster, up to that many degrees of freedom.
+constexpr int kSweepsOfMechanisms = 20, kSweepsOfTrees = 3;
+constexpr size_t kMostWays = 200;
 constexpr int kSweepsBeforeJoined = 4,
               kSweepsBetweenJoined = 10;  // of mechanisms with few contacts
 constexpr size_t kFewBodies = 2;          // something immovable and one body: sweeps are faster
@@ -40,7 +43,7 @@ constexpr size_t kFewBodies = 2;          // something immovable and one body: s
 // stand to this part of the tolerance: what is left moves them a little in each substep.
 constexpr double kOfSpeed = 1e-3, kStanding = 0.1;
 // Of Newton's method, so that the sweep that follows finds nothing left to do.
-constexpr double kOfTolerance = 0.5;
+constexpr double kOfTolerance = 0.5, kOfToleranceReduced = 0.1;
 // Newton's method pays where a factorization costs at most as much as kSweepsForAFactor sweeps, of
 // kProductsOfARow products for each row; or where it is cheap in any case.
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
@@ -399,7 +402,6 @@ double Solver::tolerance() const {
 // interactive contact force problems", 2010): stacks and large mass ratios then take a fraction of
 // the sweeps. The next sweep restores the bounds; the last one makes no such step.
 void Solver::sweep_until_still() {
-  const int first = blocks_.empty() ? kSweepsBeforeNewton : kSweepsOfMechanisms;
   const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
   for_each_main_row(start_conjugates);
   tolerance_m_s_ = tolerance();
@@ -407,6 +409,9 @@ void Solver::sweep_until_still() {
   bool after_newton = false, shared = false;
   bool join =
       !blocks_.empty() && contact_count_ > 0 && contact_count_ <= JoinedContacts::kMostContacts;
+  const int first = blocks_.empty() ? kSweepsBeforeNewton
+                    : reduced_      ? kSweepsOfTrees
+                                    : kSweepsOfMechanisms;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
@@ -490,6 +495,12 @@ void Solver::go_on_along_conjugates(double& last_square, int sweep) {
 bool Solver::newton_pays() {
   if (newton_known_) return newton_pays_;
   newton_known_ = true;
+  if (reduced_) {
+    newton_.begin_trees(bodies_);
+    blocks_.tell_trees(newton_);
+    newton_.end_trees();
+    return newton_pays_ = true;
+  }
   pairs_.clear();
   blocks_.tell_pairs(pairs_);
   for (size_t c = 0; c < contact_count_; ++c) {
@@ -520,9 +531,15 @@ bool Solver::solve_joined() {
   return solved;
 }
 
+// In reduced coordinates the joints must hold before, and are to be swept again.
 void Solver::solve_at_once() {
   newton_.begin();
-  blocks_.tell_rows(newton_, bodies_);
+  if (reduced_) {
+    blocks_.sweep(bodies_);
+    blocks_.tell_motors(newton_);
+  } else {
+    blocks_.tell_rows(newton_, bodies_);
+  }
   for (size_t c = 0; c < contact_count_; ++c) {
     ContactRows& contact = contacts_[c];
     if (contact.normal.inverse == 0.0) continue;
@@ -532,7 +549,9 @@ void Solver::solve_at_once() {
     for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
       newton_.add(contact.roll[k], load, contact.rolling);
   }
-  newton_.solve(bodies_, kOfTolerance * tolerance_m_s_, kNewtonSteps);
+  newton_.solve(bodies_, (reduced_ ? kOfToleranceReduced : kOfTolerance) * tolerance_m_s_,
+                kNewtonSteps);
+  if (reduced_) blocks_.sweep(bodies_);
 }
 
 // Corrects penetration by velocities that move the bodies in this substep and are not kept.
@@ -665,6 +684,8 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
   blocks_.prepare(bodies_, substep_s);
   if (!blocks_.empty() && blocks_.only_trees()) begin_to_swing(substep_s);
   for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
+  reduced_ = !blocks_.empty() && contact_count_ > JoinedContacts::kMostContacts &&
+             blocks_.only_trees() && blocks_.ways(bodies_) <= kMostWays;
   if (contact_count_ > 0 || !blocks_.empty()) {
     constexpr int kMostSwings = 4;
     sweep_until_still();

@@ -127,7 +127,8 @@ class Solver {
   Newton newton_;
   JoinedContacts joined_;
   bool newton_known_ = false, newton_pays_ = false;  // for this island
-  std::vector<std::pair<int, int>> pairs_;           // bodies coupled by rows
+  bool reduced_ = false;  // Newton's method, for this island, in reduced coordinates
+  std::vector<std::pair<int, int>> pairs_;  // bodies coupled by rows
 };
 
 }  // namespace ruedo::physics

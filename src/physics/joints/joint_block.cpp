@@ -179,6 +179,14 @@ bool JointBlocks::only_trees() const {
                      [](const Block& block) { return block.is_tree; });
 }
 
+size_t JointBlocks::ways(const SolverBodies& bodies) const {
+  constexpr size_t kFree = 6;
+  size_t ways = kFree * (bodies.size() - 1);
+  for (size_t b = 0; b < block_count_; ++b)
+    ways = ways + blocks_[b].tree.ways() - kFree * blocks_[b].bodies;
+  return ways;
+}
+
 bool JointBlocks::exact() const {
   return std::all_of(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(block_count_),
                      [](const Block& block) { return block.exact && block.bounded.empty(); });

@@ -33,6 +33,8 @@ class JointBlocks {
   // Whether each mechanism is solved in reduced coordinates: all joints are of JointTree's kinds,
   // and none closes a loop.
   bool only_trees() const;
+  // Degrees of freedom of trees and of all other bodies.
+  size_t ways(const SolverBodies& bodies) const;
   bool has_gears() const { return !thirds_.empty(); }  // the rows of a gearbox couple three bodies
 
   // Brings all rows to their targets as far as their bounds allow. Returns the largest error
@@ -54,6 +56,9 @@ class JointBlocks {
   // Which bodies are coupled, and by which rows.
   void tell_pairs(std::vector<std::pair<int, int>>& pairs) const;
   void tell_rows(Newton& newton, const SolverBodies& bodies);
+  // Where only_trees(): their bodies; and the rows of motors, dampers and stops.
+  void tell_trees(Newton& newton) const;
+  void tell_motors(Newton& newton);
 
  private:
   struct Joint {

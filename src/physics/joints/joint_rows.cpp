@@ -333,10 +333,18 @@ void JointBlocks::tell_rows(Newton& newton, const SolverBodies& bodies) {
   locked_.clear();
   for (const Joint& joint : joints_)
     if (blocks_[joint.block].is_tree) add_locked_rows(joint, bodies);
-  for (std::vector<Row>* rows : {&locked_, &rows_}) {
-    for (Row& row : *rows)
-      if (row.inverse > 0.0) newton.add(row);
-  }
+  for (Row& row : locked_)
+    if (row.inverse > 0.0) newton.add(row);
+  tell_motors(newton);
+}
+
+void JointBlocks::tell_trees(Newton& newton) const {
+  for (size_t b = 0; b < block_count_; ++b) blocks_[b].tree.tell_bodies(newton);
+}
+
+void JointBlocks::tell_motors(Newton& newton) {
+  for (Row& row : rows_)
+    if (row.inverse > 0.0) newton.add(row);
 }
 
 // The rows of the forces and moments that a joint of a tree transmits.

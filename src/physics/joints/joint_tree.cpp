@@ -201,4 +201,12 @@ std::pair<Vec3, Vec3> JointTree::change(int body) const {
   return {Vec3(m.change.tail<3>() + w.cross(m.arm)), w};
 }
 
+void JointTree::tell_bodies(Newton& newton) const {
+  for (size_t i = 0; i < members_.size(); ++i) {
+    const Member& m = members_[i];
+    newton.add_body(m.body, m.parent != kNone ? m.on : 0, m.arm);
+    for (size_t k = m.first; k < end_of(i); ++k) newton.add_way(ways_[k].along);
+  }
+}
+
 }  // namespace ruedo::physics

@@ -10,6 +10,7 @@
 
 #include <vector>
 
+#include "physics/base/newton.h"
 #include "physics/base/rows.h"
 
 namespace ruedo::physics {
@@ -71,6 +72,8 @@ class JointTree {
     }
   }
   std::pair<Vec3, Vec3> change(int body) const;
+  size_t ways() const { return ways_.size(); }
+  void tell_bodies(Newton& newton) const;
 
  private:
   using Six = Eigen::Matrix<double, 6, 1>;  // angular, linear
