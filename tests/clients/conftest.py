@@ -26,6 +26,7 @@ RUEDO = os.environ.setdefault("RUEDO", str(BUILD / "bin/ruedo"))
 os.environ["PYTHONPATH"] = f"{BUILD / 'python'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
 sys.path.insert(0, str(BUILD / "python"))
 sys.path.insert(0, str(HERE.parent))  # witness.py
+sys.path.insert(0, str(HERE / "peers"))
 ARENA = str(SOURCE / "worlds/arena.sdf")
 HALL = str(HERE / "hall.sdf")
 

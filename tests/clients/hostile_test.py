@@ -25,7 +25,7 @@ from ruedo import lcmtypes
 
 def fake(*options):
     url = free_url()
-    server = Server([sys.executable, str(HERE / "fake_server.py"), url, *options], url)
+    server = Server([sys.executable, str(HERE / "peers/fake_server.py"), url, *options], url)
     assert (
         server.process.stdout.readline() == "up\n"
     )  # a client waits 2 s, an interpreter may take longer to start

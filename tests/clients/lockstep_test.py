@@ -31,7 +31,7 @@ def bad_network(server_url, clients, loss, first_of=None):
     relay = subprocess.Popen(
         [
             sys.executable,
-            str(HERE / "lossy_relay.py"),
+            str(HERE / "peers/lossy_relay.py"),
             str(urlsplit(server_url).port),
             ports,
             str(loss),

@@ -38,7 +38,7 @@ class OneBus:
 
     def __enter__(self) -> None:
         self._relay = subprocess.Popen(
-            [sys.executable, str(HERE / "lossy_relay.py"), *self._ports, "0", "0", "0", "1"],
+            [sys.executable, str(HERE / "peers/lossy_relay.py"), *self._ports, "0", "0", "0", "1"],
             stdout=subprocess.PIPE,
             text=True,
         )

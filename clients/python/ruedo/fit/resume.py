@@ -1,4 +1,4 @@
-"""Finished stages of a fit, kept in the user's cache: a fit that was interrupted goes on."""
+"""Finished stages of a fit, kept in the user's cache: an interrupted fit continues."""
 
 from __future__ import annotations
 
