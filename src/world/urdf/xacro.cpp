@@ -29,7 +29,7 @@ std::string script() {
   for (const char* path : {"share/ruedo/xacro/expand.py", "src/world/urdf/xacro/expand.py"}) {
     if (std::string found = find_installed(path); !found.empty()) return found;
   }
-  return RUEDO_SOURCE_TREE "/src/world/urdf/xacro/expand.py";  // of a build outside of its source tree
+  return RUEDO_SOURCE_TREE "/src/world/urdf/xacro/expand.py";  // built outside of the source tree
 }
 
 // "FILE:LINE", added to each element by expand.py.
