@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/dynamics/friction_step.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -90,19 +92,14 @@ double JoinedContacts::change(size_t i, double wanted) {
   return std::abs(more) * of_i[i];
 }
 
-// As Solver::rub.
 double JoinedContacts::rub(const Contact& contact) {
   if (contact.along == kNone) return 0.0;
-  const double load = std::max(impulses_[contact.normal], 0.0);
-  const double m1 = contact.friction, m2 = contact.friction2;
-  double p1 = relaxed(contact.along), p2 = relaxed(contact.across);
-  if (length_of(p1 / m1, p2 / m2) > load) {
-    const double s1 = impulses_[contact.along] / m1 + contact.step * m1 * missing(contact.along),
-                 s2 = impulses_[contact.across] / m2 + contact.step * m2 * missing(contact.across);
-    const double size = length_of(s1, s2), part = size > load ? load / size : 1.0;
-    p1 = part * m1 * s1;
-    p2 = part * m2 * s2;
-  }
+  const auto rubbing = [this](size_t i, double friction) {
+    return Rubbing{friction, impulses_[i], missing(i), relaxed(i)};
+  };
+  const auto [p1, p2] =
+      rubbed(rubbing(contact.along, contact.friction), rubbing(contact.across, contact.friction2),
+             std::max(impulses_[contact.normal], 0.0), contact.step);
   const double first = change(contact.along, p1);
   return std::max(first, change(contact.across, p2));
 }

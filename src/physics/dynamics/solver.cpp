@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/dynamics/friction_step.h"
 #include "ruedo/quantity.h"
 
 namespace ruedo::physics {
@@ -326,32 +327,17 @@ void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
   }
 }
 
-// Both friction directions at once: sticking friction if it lies within the ellipse of Coulomb's
-// law; otherwise the projection of a step against the slip onto it, in coordinates in which the
-// ellipse is a circle.
 double Solver::rub(ContactRows& contact) {
   Row& first = contact.along;
   Row& second = contact.across;
   const double load = std::max(contact.normal.impulse, 0.0);  // a conjugate step may have overshot
   if (load == 0.0 && first.impulse == 0.0 && second.impulse == 0.0) return 0.0;
-  const double v1 = first.velocity(bodies_) + first.softness * first.impulse,
-               v2 = second.velocity(bodies_) + second.softness * second.impulse;
-  const double m1 = contact.friction, m2 = contact.friction2;
-  double p1 = first.impulse - v1 * first.inverse, p2 = second.impulse - v2 * second.inverse;
-  const double u1 = m1 > 0.0 ? p1 / m1 : 0.0, u2 = m2 > 0.0 ? p2 / m2 : 0.0;
-  const bool inside =
-      (m1 > 0.0 || p1 == 0.0) && (m2 > 0.0 || p2 == 0.0) && u1 * u1 + u2 * u2 <= load * load;
-  if (!inside) {
-    double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1,
-           s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
-    const double size = length_of(s1, s2);
-    if (size > load) {
-      s1 *= load / size;
-      s2 *= load / size;
-    }
-    p1 = m1 * s1;
-    p2 = m2 * s2;
-  }
+  const auto rubbing = [this](const Row& row, double friction) {
+    const double missing = -(row.velocity(bodies_) + row.softness * row.impulse);
+    return Rubbing{friction, row.impulse, missing, row.impulse + missing * row.inverse};
+  };
+  const auto [p1, p2] = rubbed(rubbing(first, contact.friction), rubbing(second, contact.friction2),
+                               load, contact.step);
   const double more1 = p1 - first.impulse, more2 = p2 - second.impulse;
   first.give(bodies_, more1);
   second.give(bodies_, more2);
