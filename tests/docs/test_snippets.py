@@ -33,6 +33,8 @@ NOT_RUN = {
     ("campaigns.md", "pip install 'ruedo[hunt]'"): "test_hunt runs the file that follows",
     ("cmake.md", "add_subdirectory"): "tests/package/test_three_ways.py does each",
     ("environments.md", "from stable_baselines3"): "needs torch: tests/engine/test_learners.py",
+    ("environments.md", "from torchrl"): "the same",
+    ("environments.md", "from ray.rllib"): "the same",
     ("environments.md", "python3 -m venv LEARN"): LEARNS,
     ("environments.md", "python3 -m venv PEERS"): LEARNS,
     ("getting-started.md", "python3 -m venv"): INSTALLS,

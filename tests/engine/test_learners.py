@@ -128,6 +128,56 @@ def test_a_missing_library_is_reported_by_name(monkeypatch):
         importlib.import_module("ruedo.gym.sb3")
 
 
+# ---- RLlib and TorchRL take vector environments as they are: what each reads of them.
+
+
+def test_infos_of_an_env_runner_of_rllib():
+    """RLlib creates environments in this way, and reads infos through this wrapper."""
+    options = {"num_envs": 6, "beams": 6, "max_episode_steps": 40}
+    envs = gymnasium.make_vec(
+        "ruedo/Navigate-v0", vectorization_mode="vector_entry_point", **options
+    )
+    assert envs.metadata["autoreset_mode"] is gymnasium.vector.AutoresetMode.NEXT_STEP
+    listed = gymnasium.wrappers.vector.DictInfoToList(envs)
+    listed.reset(seed=4)
+    over, ended = np.zeros(6, bool), 0
+    for _ in range(60):
+        _, rewards, terminated, truncated, infos = listed.step(np.tile([1.0, 0.0], (6, 1)))
+        for i, info in enumerate(infos):
+            assert info.keys() == (set() if over[i] else {"success", "collision"})
+            assert not over[i] or (rewards[i] == 0 and not terminated[i])  # the next one begins
+            assert not terminated[i] or info["success"] != info["collision"]
+        over = terminated | truncated
+        ended += over.sum()
+    assert ended >= 6  # each, at the latest after 40 actions
+    listed.close()
+
+
+def test_info_that_torchrl_reads():
+    """With SAME_STEP, and every entry a number for each environment; a missing last observation
+    counts as zeros.
+    """
+    options = {"num_envs": 4, "beams": 6, "max_episode_steps": 5, "autoreset_mode": "SameStep"}
+    envs = gymnasium.make_vec("ruedo/Navigate-v0", **options)
+    envs.reset(seed=1)
+
+    def leaves(info):
+        for name, values in info.items():
+            if isinstance(values, dict):
+                yield from leaves(values)
+            else:
+                yield name, values
+
+    for step in range(1, 11):
+        actions = np.full((4, 2), 0.1)
+        *_, truncated, info = envs.step(actions)
+        assert truncated.all() == (step % 5 == 0)
+        for name, values in leaves(info):
+            rows = [np.zeros(11, np.float32) if row is None else row for row in values]
+            assert np.stack(rows).shape == ((4, 11) if name == "final_obs" else (4,))
+    envs.close()
+
+
 # ---- Arrays, and steps in the background.
 
 

@@ -32,6 +32,7 @@ from .drive import DriveTask, GoalTask
 from .environments import SavedEpisodes, TaskEnv, TaskVectorEnv
 from .hills import Hills, HillsEnv, HillsVectorEnv
 from .navigate import Navigate, NavigateEnv, NavigateVectorEnv
+from .processes import ProcessVectorEnv
 from .push import Push, PushEnv, PushVectorEnv
 from .reach import Reach, ReachEnv, ReachVectorEnv
 from .task import Outcome, Task
@@ -56,6 +57,7 @@ __all__ = [
     "NavigateEnv",
     "NavigateVectorEnv",
     "Outcome",
+    "ProcessVectorEnv",
     "Push",
     "PushEnv",
     "PushVectorEnv",

@@ -261,7 +261,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         current draws.
         """
         self._refuse_sent("reset()")
-        seeds = self._seeds(seed)
+        seeds = seeds_of(seed, self.num_envs)
         begin = self._masked(options)
         self._set_up()
         for i in begin:
@@ -385,7 +385,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                 f"{type(self.task).__name__}.observe(){which} gives the shape {values.shape}; "
                 f"observation_space asks for {space.shape}"
             )
-        return _aligned_copy(values, space.dtype)
+        return aligned_copy(values, space.dtype)
 
     def _begin_at_once(self, observations: Any, info: Info) -> Any:
         info["final_obs"] = np.full(self.num_envs, None, object)
@@ -492,16 +492,6 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             and value.shape[:1] == (self.num_envs,)
         }
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if not isinstance(seed, (list, tuple, range, np.ndarray)) or np.ndim(seed) == 0:
-            first = whole("seed", seed, 0, MOST_SEED - self.num_envs + 1)
-            return [first + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
-        return [None if one is None else whole("seed", one, 0, MOST_SEED) for one in seed]
-
     def _masked(self, options: Info | None) -> NDArray[np.intp]:
         check_options(options)
         if not options:
@@ -581,7 +571,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         return scene.seen_from_above() if self.render_mode == "rgb_array" else scene.sdf
 
 
-def _aligned_copy(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
+def aligned_copy(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
     """Not a view of the engine's memory, which changes with the next action, and at an address from
     which JAX takes it without another copy (a multiple of 64 bytes).
     """
@@ -591,6 +581,18 @@ def _aligned_copy(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
     copied: NDArray[Any] = memory[begin : begin + size].view(dtype).reshape(values.shape)
     copied[...] = values
     return copied
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """The seed of each environment."""
+    if seed is None:
+        return [None] * num_envs
+    if not isinstance(seed, (list, tuple, range, np.ndarray)) or np.ndim(seed) == 0:
+        first = whole("seed", seed, 0, MOST_SEED - num_envs + 1)
+        return [first + i for i in range(num_envs)]
+    if len(seed) != num_envs:
+        raise ValueError(f"{len(seed)} seeds for {num_envs} environments")
+    return [None if one is None else whole("seed", one, 0, MOST_SEED) for one in seed]
 
 
 def row_of(values: Any, i: int) -> Any:
