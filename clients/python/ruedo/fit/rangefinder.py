@@ -29,7 +29,7 @@ STEEPEST = np.radians(75)  # of incidence; readings beyond it are too uncertain
 OUTLIER_M = 0.3  # half width of what residuals are modelled in
 _MOST_POINTS = 300_000
 _MOST_READINGS = 40_000
-_AT_ONCE = 400  # readings, each with up to thousands of points around it
+_AT_ONCE = 100  # readings, each with up to thousands of points around it
 _RANGE_EDGES = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _LEAST_READINGS = 500
 
