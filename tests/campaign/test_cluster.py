@@ -160,14 +160,15 @@ def test_no_cluster_is_one_line(whole):
 @pytest.fixture
 def other_build(tmp_path):
     """A second installed tree, of a build that differs in its build id."""
-    shutil.copytree(BUILD / "python", tmp_path / "other")
+    for part in ("python", "math"):
+        shutil.copytree(BUILD / part, tmp_path / "other" / part)
     ours = re.search(r"build ([0-9a-f]{40})", str(_engine.build)).group(1)
     theirs = ours[::-1]
-    (library,) = (tmp_path / "other/ruedo").glob("_engine*.so")
+    library = tmp_path / "other/math/libruedo_core.so"
     bytes_ = library.read_bytes()
     assert bytes_.count(bytes.fromhex(ours)) == 1
     library.write_bytes(bytes_.replace(bytes.fromhex(ours), bytes.fromhex(theirs)))
-    return tmp_path / "other", theirs
+    return tmp_path / "other/python", theirs
 
 
 def test_two_builds_on_two_nodes_are_one_line(whole, other_build):
