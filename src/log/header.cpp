@@ -271,6 +271,16 @@ void find_files_again(log_header_t& header, const std::string& log, Digests& dig
   }
 }
 
+// The file of that name among Ruedo's own worlds; "" without one.
+std::string shipped_as(const std::string& path) {
+  std::error_code error;
+  for (const std::string& end : ends_of(path)) {
+    const fs::path ours = fs::path(world::shipped_worlds()) / end;
+    if (end.find('/') != std::string::npos && fs::is_regular_file(ours, error)) return ours;
+  }
+  return "";
+}
+
 // The log may be untrusted: it must not reveal which files are on this machine, not even by a
 // hash.
 void check_files(const log_header_t& header, const std::string& log, Digests& digests) {
@@ -279,6 +289,10 @@ void check_files(const log_header_t& header, const std::string& log, Digests& di
   const world::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) {
+      if (const std::string ours = shipped_as(file.path); !ours.empty()) {
+        throw InputError({ours}, "was changed since " + log + " was made from " + file.path +
+                                     " (its sha256 was " + file.sha256 + ")");
+      }
       throw InputError({log}, "was made from " + file.path +
                                   ", which is neither near its world nor in a model folder "
                                   "(RUEDO_PATH); such files are not looked at");

@@ -168,7 +168,7 @@ def other_build(tmp_path):
     bytes_ = library.read_bytes()
     assert bytes_.count(bytes.fromhex(ours)) == 1
     library.write_bytes(bytes_.replace(bytes.fromhex(ours), bytes.fromhex(theirs)))
-    return tmp_path / "other/python", theirs
+    return tmp_path / "other", theirs
 
 
 def test_two_builds_on_two_nodes_are_one_line(whole, other_build):
@@ -178,7 +178,9 @@ def test_two_builds_on_two_nodes_are_one_line(whole, other_build):
     cluster = Cluster(initialize_head=True, head_node_args=head)
     try:
         cluster.add_node(
-            num_cpus=1, object_store_memory=100 << 20, env_vars={"PYTHONPATH": str(tree)}
+            num_cpus=1,
+            object_store_memory=100 << 20,
+            env_vars={"PYTHONPATH": f"{tree}/python", "LD_LIBRARY_PATH": f"{tree}/math"},
         )
         cluster.wait_for_nodes()
         command = ["campaign", "run", "c.yaml", "--ray", cluster.address, "--out", "other"]
