@@ -23,7 +23,7 @@ def test_beam_model_of_drawn_residuals():
     residual = 0.004 + sigma * rng.normal(size=20_000)
     others = rng.random(20_000) < 0.05
     residual[others] = rng.uniform(-0.3, 0.3, others.sum())
-    model, std = fit_beams(Residuals(residual, reach, incidence, 1.0))
+    model, std = fit_beams(Residuals(residual, reach, incidence, sigma, 1.0))
     assert model.range_sigma == pytest.approx(0.01, rel=0.05)
     assert model.bearing_sigma == pytest.approx(0.002, rel=0.05)
     assert model.bias == pytest.approx(0.004, abs=5e-4)
@@ -46,6 +46,32 @@ def test_room_of_exact_walls(tmp_path):
     assert noise.value == pytest.approx(0.02, rel=0.05)
     said = {one.name: one for one in found}
     assert said["bias of the range"].value is None  # surfaces are made of the same readings
+
+
+def ranges_beside_pillar(x, y, angles):
+    """Exact ranges (m) in a room of 6 x 6 m around a pillar of 0.3 m radius, both at the origin."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    walls = np.minimum((3 - x * np.sign(cosine)) / abs(cosine), (3 - y * np.sign(sine)) / abs(sine))
+    ahead, miss = -(x * cosine + y * sine), x * sine - y * cosine
+    meets = (ahead > 0) & (abs(miss) < 0.3)
+    return np.where(meets, ahead - np.sqrt(np.maximum(0.09 - miss**2, 0)), walls)
+
+
+def test_round_things_and_corners_are_no_noise(tmp_path):
+    """A good range finder, 3 mm and 0.5 mrad, drives around a pillar."""
+    rng = np.random.default_rng(8)
+    lines = []
+    for i in range(240):
+        x, y, heading = 1.2 * math.cos(i / 38), 1.2 * math.sin(i / 38), i * 0.21
+        bearings = heading + np.radians(np.arange(-90, 91)) + 5e-4 * rng.normal(size=181)
+        ranges = ranges_beside_pillar(x, y, bearings) + 0.003 * rng.normal(size=181)
+        lines.append(flaser([f"{one:.4f}" for one in ranges], (x, y, heading), float(i)))
+    log = tmp_path / "pillar.log"
+    log.write_text("".join(lines))
+    _, found = fit_rangefinder([read(log)], np.zeros(3))
+    said = {one.name: one for one in found}
+    assert said["range noise"].value == pytest.approx(0.003, rel=0.05)
+    assert said["bearing noise"].value == pytest.approx(5e-4, rel=0.2)
 
 
 def test_known_truth_of_ruedo(tmp_path):

@@ -10,7 +10,7 @@ range errors of r tan(incidence). Beside these "hits" of Thrun's beam model (Pro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ _MOST_READINGS = 40_000
 _AT_ONCE = 100  # readings, each with up to thousands of points around it
 _RANGE_EDGES = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _LEAST_READINGS = 500
+_WIDEST = 1.5  # scatter of a flat surface's points over the noise: 8 points exceed it in 1 of 100
+_MOST_ROUNDS = 20
 
 
 @dataclass(eq=False)
@@ -45,13 +47,15 @@ class Surfaces:
 
 @dataclass(eq=False)
 class Residuals:
-    """Of readings with a surface: residual (N,) m, range (N,) m, incidence (N,) rad, and of all
-    readings that were looked at the share that has one.
+    """Of readings with a surface: residual (N,) m, range (N,) m, incidence (N,) rad, standard
+    deviation of the surface's own readings about their line (N,) m; and of all readings that were
+    looked at the share that has one.
     """
 
     residual: Array
     reach: Array
     incidence: Array
+    scatter: Array
     share: float
 
 
@@ -115,18 +119,20 @@ def residuals_of(
         _against_lines(surfaces, ends[part], way[part], scan[part])
         for part in np.array_split(np.arange(len(ends)), max(1, len(ends) // _AT_ONCE))
     ]
-    residual, incidence = np.concatenate(parts, axis=1)
+    residual, incidence, scatter = np.concatenate(parts, axis=1)
     known = np.isfinite(residual)
     if not known.any():
         raise FitError(f"{recording.file}: no reading lies on a surface that other scans saw")
-    return Residuals(residual[known], reach[known], incidence[known], float(known.mean()))
+    share = float(known.mean())
+    return Residuals(residual[known], reach[known], incidence[known], scatter[known], share)
 
 
 def _against_lines(
     surfaces: Surfaces, ends: Array, way: Array, scan: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """(2, N): residual (m, scaled to the variance of a reading) and incidence (rad) of readings
-    against the lines through the points of other scans around them; NaN without a line.
+    """(3, N): residual (m, scaled to the variance of a reading) and incidence (rad) of readings
+    against the lines through the points of other scans around them, and the standard deviation of
+    those points about the line (m); NaN without a line.
     """
     near = surfaces.tree.query_ball_point(ends, WINDOW_M)
     row = np.repeat(np.arange(len(ends)), np.array([len(one) for one in near], np.int64))
@@ -152,9 +158,10 @@ def _against_lines(
         incidence = np.arccos(np.minimum(1.0, np.abs(facing)))
         leverage = 1 / count + (middle_x * cosine + middle_y * sine) ** 2 / large
         residual = (middle_x * sine - middle_y * cosine) / facing / np.sqrt(1 + leverage)
+        scatter = np.sqrt(small / (count - 2))
         good = (count >= LEAST_POINTS) & (small / count <= FLAT_M**2) & (large >= 9 * small)
         good &= (large / count >= (WINDOW_M / 4) ** 2) & (incidence <= STEEPEST)
-    return np.where(good, [residual, incidence], np.nan)
+    return np.where(good, [residual, incidence, scatter], np.nan)
 
 
 def fit_beams(found: Residuals) -> tuple[BeamModel, Array]:
@@ -181,6 +188,28 @@ def fit_beams(found: Residuals) -> tuple[BeamModel, Array]:
         float(1 / (1 + np.exp(-values[3]))),
     )  # fmt: skip
     return model, _curvature(cost, values)[1:3]
+
+
+def fit_flat(found: Residuals) -> tuple[BeamModel, Array, int]:
+    """The same by readings on flat surfaces, and how many these are. At corners and on round things
+    the line is wrong by more than the noise of a good range finder: its points scatter about it by
+    more than the model says. The share of outliers is that of all readings.
+    """
+    model, relative = fit_beams(found)
+    outliers, kept = model.outliers, len(found.residual)
+    for _ in range(_MOST_ROUNDS):
+        noise = model.sigma(found.reach, found.incidence) * np.cos(found.incidence)
+        flat = found.scatter <= _WIDEST * noise
+        if flat.sum() < _LEAST_READINGS or flat.sum() == kept:
+            break
+        kept = int(flat.sum())
+        model, relative = fit_beams(
+            Residuals(
+                found.residual[flat], found.reach[flat], found.incidence[flat],
+                found.scatter[flat], found.share,
+            )
+        )  # fmt: skip
+    return replace(model, outliers=outliers), relative, kept
 
 
 def _curvature(cost: object, values: Array) -> Array:
@@ -214,14 +243,14 @@ def fit_rangefinder(
             f"{recording.file}: {len(found.residual)} readings lie on surfaces that other scans saw; "
             f"at least {_LEAST_READINGS} are needed"
         )
-    model, relative = fit_beams(found)
+    model, relative, used = fit_flat(found)
     estimates = []
     for name, value, std, unit in (
         ("range noise", model.range_sigma, relative[0], "m"),
         ("bearing noise", model.bearing_sigma, relative[1], "rad"),
     ):
         if np.isfinite(std) and std < 0.5:
-            why = f"on {len(found.residual)} readings; the path's own errors are in it"
+            why = f"on {used} readings; the path's own errors are in it"
             estimates.append(log_normal(name, value, float(std), unit, why))
         else:
             why = "it is too small beside the others, or all surfaces are met head-on"
