@@ -92,7 +92,7 @@ def test_observations_are_the_callers_own():
         envs.reset()
 
 
-def test_a_worker_that_is_killed_is_named_and_the_others_end():
+def test_the_error_names_a_killed_worker_and_the_others_end():
     envs = ProcessVectorEnv(ruedo.gym.Navigate, 4, workers=2, beams=4)
     envs.reset(seed=1)
     processes = [worker.process for worker in envs._workers]
