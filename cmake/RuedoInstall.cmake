@@ -7,7 +7,7 @@ set_target_properties(ruedo ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN
 install(TARGETS ruedo ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
 install(FILES ${PROJECT_SOURCE_DIR}/src/world/urdf/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm" PATTERN generator EXCLUDE)
 
 # LCM, which comes from a wheel and may be missing where the tree is moved to; libraries that call our elementary functions.
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# make_deb_in_debian.sh FOLDER SUITE OUT: makes Ruedo's Debian package of the checkout's commit in a Debian of that suite, made by
+# debootstrap in FOLDER/SUITE, and puts it into OUT. apt, pip and npm use the same package sources as here. Wants root.
+set -euo pipefail
+folder=$(realpath "$1") suite=$2 out=$(realpath "$3")
+here=$(dirname "$(realpath "$0")")
+root=$folder/$suite
+
+if [[ ! -e $root/etc/debian_version ]]; then
+  debootstrap --variant=minbase --include=ca-certificates,git "$suite" "$root" >"$folder/$suite.log"
+fi
+cp /etc/resolv.conf "$root/etc/resolv.conf"
+cp -r /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/"
+rm -f "$root"/etc/apt/apt.conf.d/docker-*
+echo 'DPkg::Options:: "--force-confold";' >"$root/etc/apt/apt.conf.d/90keep"    # packages bring some of these files
+for config in /etc/pip.conf "$HOME/.npmrc" /etc/ssl/certs/ca-certificates.crt; do    # a proxy may sign for the registries
+  [[ ! -e $config ]] || install -D "$config" "$root${config/#$HOME/\/root}"
+done
+trap 'umount "$root/proc" 2>/dev/null || true' EXIT
+mount -t proc proc "$root/proc"
+rm -rf "$root/ruedo" "$root/out"
+git clone --quiet --no-hardlinks "$here/.." "$root/ruedo"
+chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive bash -euc \
+  'apt-get -q update >/dev/null; /ruedo/scripts/release --deb /out'
+mkdir -p "$out"
+cp "$root"/out/ruedo_*.deb "$out"
