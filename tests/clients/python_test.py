@@ -253,6 +253,17 @@ def test_a_robot_without_a_drive_has_faults():
         assert [scan.ranges.max() for scan in seen.all(robot.lrf)] == [math.inf] + 5 * [0.5]
 
 
+def test_a_reader_counts_what_it_skips():
+    with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
+        odometry = sim.robot("p3at").odometry  # every 20 ms, which are 4 steps
+        with pytest.raises(ruedo.Timeout):
+            odometry.latest(timeout=0.01)  # subscribes
+        for steps, skipped in ((20, 0), (20, 4), (4, 4), (40, 13)):
+            seen = sim.step(steps).latest(odometry)
+            assert odometry.latest(PATIENCE).utime == seen.utime
+            assert odometry.dropped == skipped
+
+
 class SlowSocket:
     """A connection whose publish() does not return before the reply has been received."""
 

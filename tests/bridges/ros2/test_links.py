@@ -41,6 +41,7 @@ class Tree:
         )[-1].data
         self.frames: dict[int, dict] = {}  # by time
         self.positions: dict[int, dict[str, float]] = {}
+        self.speeds: list[tuple[float, float]] = []  # m/s ahead, rad/s to the left
 
     def listen(self):
         for message in self.moving.take(N=1000):
@@ -69,11 +70,17 @@ def driven():
             cmd_vel.write(Twist(Vector3(x=0.2), Vector3(z=0.3)))
             arm.write(Float64MultiArray(MultiArrayLayout([], 0), [0.7, 0.15]))
             tree.listen()
-            moved = any(o.pose.pose.position.x > 0.3 for o in odometry.take(N=100))
+            heard = odometry.take(N=100)
+            tree.speeds += [(o.twist.twist.linear.x, o.twist.twist.angular.z) for o in heard]
+            moved = any(o.pose.pose.position.x > 0.3 for o in heard)
             return moved and any(p.get("out", 0) > 0.12 for p in tree.positions.values())
 
         wait_for(arrived, "an arm that is out on a robot that drives")
         yield tree
+
+
+def test_odometry_has_the_commanded_velocities(driven):
+    assert driven.speeds[-1] == pytest.approx((0.2, 0.3), abs=0.02)
 
 
 def complete(tree: Tree, joints: int) -> list[int]:
