@@ -44,6 +44,16 @@ def code(notebook):
     return "\n".join(cells(notebook, "code"))
 
 
+def execute(notebook, monkeypatch):
+    """Runs it in its folder; returns its names."""
+    monkeypatch.chdir(notebook.parent)
+    names = {"__name__": "__main__"}
+    for source in cells(notebook, "code"):
+        exec(compile(source.replace("%matplotlib inline", ""), notebook.name, "exec"), names)
+    mpl.pyplot.close("all")
+    return names
+
+
 def run(notebook, monkeypatch, solved):
     """What practise() gave, in the notebook's folder. solved: by the solution."""
     attempts = []
@@ -55,11 +65,7 @@ def run(notebook, monkeypatch, solved):
 
     attempt = practise.practise
     monkeypatch.setattr(practise, "practise", recorded)
-    monkeypatch.chdir(notebook.parent)
-    names = {"__name__": "__main__"}
-    for source in cells(notebook, "code"):
-        exec(compile(source.replace("%matplotlib inline", ""), notebook.name, "exec"), names)
-    mpl.pyplot.close("all")
+    execute(notebook, monkeypatch)
     return attempts
 
 
@@ -80,6 +86,11 @@ def test_an_evening_runs_and_is_not_solved_yet(notebook, monkeypatch):
 def test_an_evening_passes_with_the_solution(notebook, monkeypatch):
     for one in run(notebook, monkeypatch, solved=True):
         assert one.passed, one
+
+
+def test_the_learners_evening_runs(monkeypatch):
+    rates = execute(COURSE / "evening_10_learner.ipynb", monkeypatch)["rates"]
+    assert rates["learnt"][0] >= 0.8 and rates["at random"][0] <= 0.1
 
 
 @pytest.mark.parametrize("notebook", EVENINGS, ids=lambda path: path.stem)
