@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -189,3 +190,14 @@ def test_an_interrupted_fit_goes_on(tmp_path, monkeypatch):
     for other in (Kept([log], "other options"), Kept([__file__], "options")):
         with pytest.raises(KeyboardInterrupt):
             fitting.fit([recording], kept=other)
+
+
+def test_stages_of_another_user_are_not_read(tmp_path, monkeypatch):
+    """They are a pickle, which runs code."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    kept = Kept([__file__], "options")
+    kept.save([1, 2])
+    assert kept.load() == [1, 2]
+    with monkeypatch.context() as other:
+        other.setattr(os, "getuid", lambda: 12345)
+        assert kept.load() is None

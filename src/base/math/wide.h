@@ -1,5 +1,5 @@
 // RUEDO_WIDE: a function of innermost loops, compiled for wider registers, too, where the processor
-// has them. There is no contraction to FMA: the bits are the same.
+// has them. The compiler contracts nothing to FMA, so the bits are the same.
 #pragma once
 
 #if defined(__x86_64__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \

@@ -248,7 +248,7 @@ void EmbreeRayScene::cast_packets(std::span<const Ray> rays, std::span<CastPacke
   cast_movers(rays, packets, batch);
 }
 
-// The movers near all packets are found at once: mostly there are none.
+// One visit of the tree finds the movers near all packets, mostly none.
 void EmbreeRayScene::cast_movers(std::span<const Ray> rays, std::span<CastPacket> packets,
                                  RayBatch& batch) const {
   constexpr size_t kFew = 16;  // for more, each packet asks the tree

@@ -74,7 +74,7 @@ class StaticRayScene {
   RTCDevice device() const { return device_.get(); }
   // rays in the world's frame then need their shear
   bool has_meshes() const { return has_meshes_; }
-  // What rays may meet, as far as it is known before they are cast.
+  // The shapes that a scan may hit, selected before its rays are cast.
   struct Within {
     bool fan_known = false;
     RayFan fan;

@@ -21,11 +21,11 @@ def cache_folder() -> File | None:
 
 
 class Kept:
-    """What the stages of one fit found: of these files' bytes and these options."""
+    """What the stages of one fit found: by these files' bytes, these options and this code."""
 
     def __init__(self, files: Iterable[str | File], options: object):
         digest = hashlib.sha256(repr((__version__, options)).encode())
-        for name in files:
+        for name in [*files, *sorted(File(__file__).parent.glob("*.py"))]:
             file = File(name)
             for one in sorted(file.rglob("*")) if file.is_dir() else [file]:
                 if one.is_file():
@@ -36,10 +36,12 @@ class Kept:
         self.file = folder / "fit" / f"{digest.hexdigest()}.stages" if folder else None
 
     def load(self) -> Any:
-        """What save() got last, or None. A damaged file counts as none."""
+        """What save() got last, or None. A damaged file, or another user's, counts as none."""
         if self.file is None:
             return None
         try:
+            if self.file.stat().st_uid != os.getuid():  # a pickle runs code
+                return None
             return pickle.loads(self.file.read_bytes())
         except Exception:
             return None
