@@ -194,3 +194,17 @@ tests_of() {
   names=$(awk -v tiers=" $* " 'index(tiers, " " $1 " ") {for (i = 2; i <= NF; ++i) print $i}' "$ruedo_root/tests/tiers.txt" | paste -sd '|')
   printf '^(%s)$' "$names"
 }
+
+# Signs FILE by the key of gpg's in RUEDO_GPG_KEY (FILE.asc) and by minisign's in the file RUEDO_MINISIGN_KEY
+# (FILE.minisig), where they are given. Signatures of an earlier FILE go.
+sign() {
+  rm -f "$1".{asc,minisig}
+  if [[ -n ${RUEDO_GPG_KEY:-} ]]; then
+    gpg --batch --yes --local-user "$RUEDO_GPG_KEY" --armor --detach-sign "$1" ||
+      fail "$EXIT_ENVIRONMENT" "gpg could not sign with the key $RUEDO_GPG_KEY"
+  fi
+  if [[ -n ${RUEDO_MINISIGN_KEY:-} ]]; then
+    minisign -S -s "$RUEDO_MINISIGN_KEY" -m "$1" ||
+      fail "$EXIT_ENVIRONMENT" "minisign could not sign with the key in $RUEDO_MINISIGN_KEY"
+  fi
+}

@@ -172,6 +172,39 @@ def test_the_gate_leaves_out_what_the_tiers_say():
     assert len(gate) > 1000 and not [name for name in gate if re.fullmatch(left_out, name)]
 
 
+@pytest.mark.skipif(not shutil.which("gpg"), reason="gpg is not installed")
+def test_a_release_is_signed_by_the_key_of_the_environment(tmp_path):
+    sums, home = tmp_path / "SHA256SUMS", Path(tempfile.mkdtemp())  # a short path, for gpg's socket
+    sums.write_text("of a release\n")
+    sums.with_suffix(".minisig").write_text("of an earlier release\n")
+    environment = os.environ | {"GNUPGHOME": str(home), "RUEDO_MINISIGN_KEY": ""}
+    key = ["--pinentry-mode", "loopback", "--passphrase", "", "--quick-gen-key", "me@example.org"]
+    subprocess.run(["gpg", "--batch", "--quiet", *key], env=environment, check=True)
+
+    def sign(key: str) -> subprocess.CompletedProcess:
+        return subprocess.run(
+            ["bash", "-c", '. "$0" && sign "$1"', ROOT / "scripts/lib.sh", sums],
+            env=environment | {"RUEDO_GPG_KEY": key},
+            capture_output=True,
+            text=True,
+        )
+
+    try:
+        assert sign("").returncode == 0 and os.listdir(tmp_path) == ["SHA256SUMS"]
+        refused = sign("other@example.org")
+        assert refused.returncode == 4
+        assert "gpg could not sign with the key other@example.org" in refused.stderr
+        assert sign("me@example.org").returncode == 0
+        signature = f"{sums}.asc"
+        verify = ["gpg", "--quiet", "--verify", signature, sums]
+        assert subprocess.run(verify, env=environment, capture_output=True).returncode == 0
+        sums.write_text("of another release\n")
+        assert subprocess.run(verify, env=environment, capture_output=True).returncode != 0
+    finally:
+        subprocess.run(["gpgconf", "--kill", "all"], env=environment, check=False)
+        shutil.rmtree(home)
+
+
 def test_failed_tests_are_listed_at_the_end(tmp_path):
     (tmp_path / "CTestTestfile.cmake").write_text("""
 add_test(good "true")

@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# make_deb_in_debian.sh FOLDER SUITE OUT: makes Ruedo's Debian package of the checkout's commit in a Debian of that suite, made by
-# debootstrap in FOLDER/SUITE, and puts it into OUT. apt, pip and npm use the same package sources as here. Wants root.
+# release_in_debian.sh FOLDER SUITE OUT [--deb]: runs scripts/release for the checkout's commit in a bare Debian of that suite, made
+# by debootstrap in FOLDER/SUITE, and puts what it makes into OUT. The bytes are those of a release on any other host with that
+# Debian's packages. apt, pip and npm use the same package sources as here. Wants root.
 set -euo pipefail
 folder=$(realpath "$1") suite=$2 out=$(realpath "$3")
+shift 3
 here=$(dirname "$(realpath "$0")")
 root=$folder/$suite
 
@@ -21,6 +23,6 @@ mount -t proc proc "$root/proc"
 rm -rf "$root/ruedo" "$root/out"
 git clone --quiet --no-hardlinks "$here/.." "$root/ruedo"
 chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive bash -euc \
-  'apt-get -q update >/dev/null; /ruedo/scripts/release --deb /out'
+  'apt-get -q update >/dev/null; /ruedo/scripts/release "$@" /out' bash "$@"
 mkdir -p "$out"
-cp "$root"/out/ruedo_*.deb "$out"
+cp "$root"/out/* "$out"
