@@ -41,7 +41,7 @@ venv/bin/python -c 'import test_room; test_room.test_robot_advances_half_a_metre
 other/bin/pip install -q --no-index --find-links "$wheels" 'ruedo[camera]'
 for one in venv other; do
   [[ $($one/bin/ruedo --prefix) == "$PWD/$one/"* ]]
-  $one/bin/python -c "import importlib; found = importlib.import_module('ruedo.launch').find_ruedo(); assert found.startswith('$PWD/$one/'), found"
+  $one/bin/python -c "import importlib; found = importlib.import_module('ruedo.launching').find_ruedo(); assert found.startswith('$PWD/$one/'), found"
 done
 rm -rf other
 

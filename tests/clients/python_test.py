@@ -27,7 +27,7 @@ import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import lcmtypes, samples
 from ruedo.decoding import decode
-from ruedo.launch import _options
+from ruedo.launching import _options
 from ruedo.session.control import Session
 from ruedo.transport.address import read_address
 from ruedo.transport.multicast import MulticastTransport

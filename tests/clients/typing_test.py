@@ -2,6 +2,8 @@
 documentation pass mypy and pyright (of basedpyright, which brings its Node.js along).
 """
 
+import ast
+import importlib
 import inspect
 import json
 import os
@@ -43,6 +45,53 @@ def test_dir_has_what_a_user_should_see_and_nothing_else():
     ):
         assert name not in names
     assert not [name for name in names if name.startswith("_") and not name.startswith("__")]
+
+
+def test_names_are_those_that_type_checkers_see():
+    """They are loaded by name; checkers read the imports."""
+    tree = ast.parse((SOURCE / "clients/python/ruedo/__init__.py").read_text())
+    checked = next(node for node in tree.body if isinstance(node, ast.If))
+    homes = {
+        (one.asname or one.name): node.module
+        for node in checked.body
+        if isinstance(node, ast.ImportFrom)
+        for one in node.names
+        if one.name != "*"
+    }
+    listed = ast.literal_eval(
+        next(node for node in checked.body if isinstance(node, ast.Assign)).value
+    )
+    assert set(listed) <= set(homes)
+    generated = {*ruedo.samples.__all__, *ruedo.vocabulary.__all__}
+    hidden = {"samples", "vocabulary", "OccupancyMap"}
+    assert set(ruedo.__all__) | hidden == set(homes) | generated
+    for name, home in homes.items():
+        thing = getattr(ruedo, name)
+        assert thing is getattr(importlib.import_module(f"ruedo.{home or name}"), name, thing), name
+    assert not hasattr(ruedo, "no_such_name")
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import ruedo",
+        "import ruedo, ruedo.regression",  # by each pytest
+        "import ruedo; ruedo.find_ruedo; ruedo.World; ruedo.NoServer",
+        # launch() starts the server first.
+        "import ruedo, subprocess\n"
+        "def started(*command, **options): raise OSError(0, 'nothing')\n"
+        "subprocess.Popen = started\n"
+        "try: ruedo.launch('arena')\n"
+        "except ruedo.LaunchError: pass\n",
+    ],
+)
+def test_numpy_is_loaded_where_it_is_used(program):
+    done = subprocess.run(
+        [sys.executable, "-c", program + "\nimport sys; print('numpy' in sys.modules)"],
+        capture_output=True,
+        text=True,
+    )
+    assert (done.stdout, done.stderr) == ("False\n", "")
 
 
 def test_public_names_have_documentation():

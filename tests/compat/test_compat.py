@@ -86,6 +86,7 @@ types = {
 }
 names = {}
 classes = {name for name, one in vars(ruedo).items() if inspect.isclass(one)}  # deprecated, too
+classes |= set(getattr(ruedo, "_HIDDEN", ()))  # where they are loaded on first use
 for name in {*ruedo.__all__, *classes}:
     one = getattr(ruedo, name)
     members = list(inspect.signature(one).parameters) if inspect.isfunction(one) else dir(one)

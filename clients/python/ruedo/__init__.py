@@ -29,8 +29,8 @@ Units are SI, angles radians; x ahead, y left, z up. `help(ruedo.Robot)` and so 
 `dir(ruedo)` every name, and the command `ruedo docs` opens the documentation.
 """
 
+from importlib import import_module
 from importlib.util import find_spec
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from ._installation import load_glib
@@ -38,7 +38,6 @@ from ._installation import load_glib
 load_glib()  # before anything imports lcm
 
 try:
-    from . import lcmtypes
     from ._version import __version__ as __version__
 except ImportError as _error:
     raise ImportError(
@@ -46,11 +45,12 @@ except ImportError as _error:
         "build the target python_types and use BUILD/python"
     ) from _error
 
-_HAS_NUMPY = find_spec("numpy") is not None  # programs of plain LCM need the message types alone
-if TYPE_CHECKING or _HAS_NUMPY:
-    from . import markers, samples, vocabulary
+if TYPE_CHECKING:
+    from . import lcmtypes, markers, samples, vocabulary
     from .bodies import Body, Twist
     from .callbacks import Subscription
+    from .engine import Engine as Engine
+    from .engine import SavedWorld as SavedWorld
     from .errors import (
         BadWorld,
         LaunchError,
@@ -67,7 +67,7 @@ if TYPE_CHECKING or _HAS_NUMPY:
     )
     from .geometry import Transform, normalize_angle
     from .joints import Joint, JointStream
-    from .launch import find_ruedo, launch
+    from .launching import find_ruedo, launch
     from .lockstep import Command, Message, Observations
     from .logs import Log, LogChannel, open_log, read_log
     from .maps import Map, load_map
@@ -80,89 +80,77 @@ if TYPE_CHECKING or _HAS_NUMPY:
     from .values import Sample
     from .vocabulary import *  # noqa: F403
     from .world import World
-else:
-    samples = vocabulary = SimpleNamespace(__all__=[])
 
-
-if TYPE_CHECKING:
-    from .engine import Engine as Engine
-    from .engine import SavedWorld as SavedWorld
-
-
-def __dir__() -> list[str]:
-    """The names that users should see."""
-    return sorted([*__all__, "__version__"])
-
-
-def _late(name: str) -> object:
-    """``ruedo.Engine`` and its snapshots need the compiled part of the package: loaded on first
-    use.
-    """
-    if not _HAS_NUMPY and not name.startswith("_"):
-        raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")
-    if name not in ("Engine", "SavedWorld"):
-        raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
-    try:
-        from . import engine
-    except ImportError as error:
-        raise ImportError(
-            f"ruedo.{name} is not in this installation of the client: it comes with Ruedo's wheel, for Python 3.11 "
-            f"and newer, and with a build of Ruedo, for the Python that built it ({error})"
-        ) from error
-    return getattr(engine, name)
-
-
-if not TYPE_CHECKING:  # else checkers take any name for one of the package's
-    __getattr__ = _late
-
-
-__all__ = [
-    "BadWorld",
-    "Body",
-    "Camera",
-    "Command",
-    "Device",
-    "Joint",
-    "JointStream",
-    "LaunchError",
-    "LeaseLost",
-    "Log",
-    "LogChannel",
-    "Map",
-    "Message",
-    "Motion",
-    "MotionError",
-    "NoServer",
-    "NotSupported",
-    "Observations",
-    "Reader",
-    "RequestError",
-    "Robot",
-    "RuedoError",
-    "RunEnded",
-    "Sample",
-    "Simulation",
-    "Stream",
-    "Subscription",
-    "Timeout",
-    "Transform",
-    "Twist",
-    "TypeMismatch",
-    "UnknownName",
-    "World",
-    "connect",
-    "find_ruedo",
-    "launch",
-    "lcmtypes",
-    "load_map",
-    "markers",
-    "normalize_angle",
-    "open_log",
-    "read_log",
-]
-__all__ += samples.__all__ + vocabulary.__all__
-if find_spec("ruedo._engine"):
+    __all__ = [
+        "BadWorld",
+        "Body",
+        "Camera",
+        "Command",
+        "Device",
+        "Joint",
+        "JointStream",
+        "LaunchError",
+        "LeaseLost",
+        "Log",
+        "LogChannel",
+        "Map",
+        "Message",
+        "Motion",
+        "MotionError",
+        "NoServer",
+        "NotSupported",
+        "Observations",
+        "Reader",
+        "RequestError",
+        "Robot",
+        "RuedoError",
+        "RunEnded",
+        "Sample",
+        "Simulation",
+        "Stream",
+        "Subscription",
+        "Timeout",
+        "Transform",
+        "Twist",
+        "TypeMismatch",
+        "UnknownName",
+        "World",
+        "connect",
+        "find_ruedo",
+        "launch",
+        "lcmtypes",
+        "load_map",
+        "markers",
+        "normalize_angle",
+        "open_log",
+        "read_log",
+    ]
+    __all__ += samples.__all__ + vocabulary.__all__
     __all__ += ["Engine", "SavedWorld"]
+
+# The same names, by module. Each is loaded on first use, so that `import ruedo` takes little time.
+_NAMES = {
+    "bodies": "Body Twist",
+    "callbacks": "Subscription",
+    "errors": "BadWorld LaunchError LeaseLost MotionError NoServer NotSupported RequestError "
+    "RuedoError RunEnded Timeout TypeMismatch UnknownName",
+    "geometry": "Transform normalize_angle",
+    "joints": "Joint JointStream",
+    "launching": "find_ruedo launch",
+    "lockstep": "Command Message Observations",
+    "logs": "Log LogChannel open_log read_log",
+    "maps": "Map load_map OccupancyMap",
+    "motion": "Motion",
+    "robot": "Camera Device Robot",
+    "simulation": "Simulation connect",
+    "stream": "Reader Stream",
+    "values": "Sample",
+    "world": "World",
+}
+_GENERATED = ("vocabulary", "samples")  # modules that have their names in __all__
+_MODULES = ("lcmtypes", "markers", *_GENERATED, *_NAMES)
+_COMPILED = ("Engine", "SavedWorld")
+_HIDDEN = ("OccupancyMap",)  # for programs of earlier versions
 
 
 class _Names(list[str]):
@@ -172,5 +160,61 @@ class _Names(list[str]):
         return False
 
 
-if not TYPE_CHECKING:
-    __all__ = _Names(__all__)  # noqa: PLE0605
+def _listed() -> list[str]:
+    names = {"lcmtypes", "markers", *" ".join(_NAMES.values()).split()}
+    for module in _GENERATED:
+        names.update(import_module(f".{module}", __name__).__all__)
+    if find_spec("ruedo._engine"):
+        names.update(_COMPILED)
+    return sorted(names - set(_HIDDEN))
+
+
+def __dir__() -> list[str]:
+    """The names that users should see."""
+    return sorted([*_listed(), "__version__"])
+
+
+def _home(name: str) -> str:
+    """The module that has the name; "": none."""
+    for module, names in _NAMES.items():
+        if name in names.split():
+            return module
+    for module in _GENERATED:
+        if name in import_module(f".{module}", __name__).__all__:
+            return module
+    return ""
+
+
+def _compiled(name: str) -> object:
+    try:
+        return getattr(import_module(".engine", __name__), name)
+    except ImportError as error:
+        raise ImportError(
+            f"ruedo.{name} is not in this installation of the client: it comes with Ruedo's wheel, for Python 3.11 "
+            f"and newer, and with a build of Ruedo, for the Python that built it ({error})"
+        ) from error
+
+
+def _late(name: str) -> object:
+    """What is used for the first time."""
+    if name == "__all__":
+        return _Names(_listed())
+    no_such_name = AttributeError(f"module 'ruedo' has no attribute {name!r}")
+    if name.startswith("_") or (name not in _MODULES and find_spec(f"ruedo.{name}")):
+        raise no_such_name  # of a module `from . import name` asks first, and imports it then
+    if name != "lcmtypes" and find_spec("numpy") is None:
+        raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
+    if name in _COMPILED:
+        found = _compiled(name)
+    elif home := _home(name):
+        found = getattr(import_module(f".{home}", __name__), name)
+    else:
+        raise no_such_name
+    globals()[name] = found
+    return found
+
+
+if not TYPE_CHECKING:  # else checkers take any name for one of the package's
+    __getattr__ = _late

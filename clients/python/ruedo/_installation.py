@@ -5,7 +5,6 @@ is linked to.
 from __future__ import annotations
 
 import ctypes
-from pathlib import Path
 
 _GLIB = "libglib-2.0.so.0"
 
@@ -15,5 +14,7 @@ def load_glib() -> None:
     try:
         ctypes.CDLL(_GLIB)
     except OSError:
+        from pathlib import Path
+
         for file in (Path(__file__).resolve().parent / "lib").glob(f"**/{_GLIB}"):
             ctypes.CDLL(str(file))

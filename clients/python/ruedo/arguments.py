@@ -10,12 +10,13 @@ import operator
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ParamSpec, TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from .errors import CONTROL
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -218,6 +219,8 @@ def array(what: str, value: Any) -> NDArray[np.float64]:
     """Real numbers of any shape. Raises TypeError for other values, and for arrays with imaginary
     parts, masks or units of time, which a float64 would lose.
     """
+    import numpy as np  # here, so that launch() starts the server before NumPy is loaded
+
     try:
         given = np.asarray(value)
         if given.dtype.kind in "biufO" and not isinstance(value, np.ma.MaskedArray):

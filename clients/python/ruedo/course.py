@@ -8,7 +8,7 @@ import argparse
 import shutil
 from pathlib import Path
 
-from .launch import find_ruedo
+from .launching import find_ruedo
 from .terminal import tell
 
 GOOD, THERE, ENVIRONMENT = 0, 1, 4

@@ -10,7 +10,7 @@ import webbrowser
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-from .launch import find_ruedo
+from .launching import find_ruedo
 from .terminal import tell
 
 GOOD, ENVIRONMENT = 0, 4

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from .arguments import (
@@ -41,7 +40,7 @@ from .arguments import (
     word,
 )
 from .errors import RuedoError
-from .launch import find_ruedo
+from .launching import find_ruedo
 
 _PARTING_S = 10.0  # that a run has to end its client
 _LONGEST_S = 1e6  # the system cannot wait for ever at once
@@ -95,8 +94,8 @@ def _held(name: str, value: object) -> str:
 
 
 def _countable(what: str, value: Any, kind: str = "number") -> Any:
-    """The value; refuses a bool, which Python takes for 0 or 1."""
-    if isinstance(value, (bool, np.bool_)):
+    """The value; refuses a bool, Python's or NumPy's, which counts as 0 or 1."""
+    if type(value).__name__ in ("bool", "bool_"):  # each pytest would wait for NumPy's import
         raise TypeError(f"{what} is a {kind}, not {value}")
     return value
 

@@ -22,7 +22,7 @@ from typing import Any
 
 from ..decoding import decode
 from ..engine import Engine
-from ..launch import find_ruedo
+from ..launching import find_ruedo
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL
 from .controller import DONE, NothingYet, View, make_controller, velocity_of
 from .errors import CampaignError

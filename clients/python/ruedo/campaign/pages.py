@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ..launch import find_ruedo
+from ..launching import find_ruedo
 from ..terminal import tell
 from .local import Crew
 from .plan import Case

@@ -21,7 +21,7 @@ from urllib.parse import quote
 import numpy as np
 
 from ..errors import NotSupported
-from ..launch import find_ruedo
+from ..launching import find_ruedo
 from ..maps import OCCUPIED, load_map
 from .compare import compare_with
 from .errors import missing

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..engine import Engine
-from ..launch import find_ruedo
+from ..launching import find_ruedo
 from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..launch import launch
+from ..launching import launch
 from .errors import FitError
 from .fitting import Robot, mount_of, rangefinder_of
 from .progress import track

@@ -9,7 +9,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from ..launch import find_ruedo
+from ..launching import find_ruedo
 from .errors import FitError, UsageError
 from .mapping import Moving, Occupancy, occupancy
 from .recording import Recording

@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..launch import launch
+from ..launching import launch
 from ..simulation import Simulation
 
 

@@ -19,14 +19,16 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 from . import arguments
 from .errors import LaunchError, NoServer, for_terminal
-from .simulation import Simulation
 from .transport.address import has_multicast_route, read_address
 from .transport.stream import is_served
 from .world import World
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
 
 _MOST_HEARD = 1 << 16  # bytes of warnings that are read at once
 _MOST_WARNED = 1000  # warnings, each of which is printed once
@@ -128,6 +130,8 @@ def _joined(server: _Server, url: str, name: str, timeout: float, page: str | No
     """Joins the server; ends it if that fails. Raises LaunchError with the server's output."""
     until = time.monotonic() + timeout
     try:
+        from .simulation import Simulation  # NumPy is loaded while the server loads the world
+
         server.await_port(url, until)
         return Simulation(url, name, max(until - time.monotonic(), 1.0), server, view=page)
     except NoServer as error:
