@@ -112,13 +112,29 @@ def test_a_run_goes_on_where_it_was_ended(tmp_path, monkeypatch, learner):
     assert rows[-1]["cpu_s"] >= 0.239
     done = json.loads(run.record.read_text())
     assert done["test_success"] == 0.75 and done["steps"] >= before[-1]["steps"]
-    assert not run.model.exists()
     # A run that is complete is left out; the next seed is not.
     train(tmp_path, monkeypatch, "--seeds", "2", "--minutes", "0.004")
     one, two = "Reach-v0-ppo-1", "Reach-v0-ppo-2"
     assert learner == [(one, False), (one, True), (two, False)]
     assert "| Reach-v0 | PPO | 2 |" in (tmp_path / "results.md").read_text()
     assert "<svg" in (tmp_path / "results.svg").read_text()
+
+
+def test_more_minutes_continue_a_complete_run(tmp_path, monkeypatch, learner):
+    """Fewer leave it as it is. Without its checkpoint, as in a clone, it begins anew."""
+    train(tmp_path, monkeypatch, "--seeds", "1", "--minutes", "0.004")
+    run = results.Run(tmp_path, "Reach-v0", "ppo", 1)
+    before = run.rows()
+    train(tmp_path, monkeypatch, "--seeds", "1", "--minutes", "0.002")
+    assert run.rows() == before
+    train(tmp_path, monkeypatch, "--seeds", "1", "--minutes", "0.006")
+    rows = run.rows()
+    assert rows[: len(before)] == before and rows[-1]["cpu_s"] >= 0.359
+    assert json.loads(run.record.read_text())["cpu_s"] >= 0.359
+    run.model.unlink()
+    train(tmp_path, monkeypatch, "--seeds", "1", "--minutes", "0.008")
+    assert run.rows()[0]["cpu_s"] < before[-1]["cpu_s"] and run.rows()[-1]["cpu_s"] >= 0.479
+    assert [goes_on for _, goes_on in learner] == [False, True, False]
 
 
 def test_the_band_is_students():

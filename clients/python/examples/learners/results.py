@@ -6,7 +6,9 @@ and each policy as a few kB that NumPy replays (replay.py).
 
 A run is a task, an algorithm and a seed, and takes --minutes of CPU time. It can be ended at any
 time: the same command continues it from its last checkpoint (at most a twentieth of it is lost),
-and leaves out runs that are complete. With --only-plot nothing is trained.
+and leaves out runs that have taken as long. More --minutes continue them, too; where their
+checkpoints (.zip, .pkl) are missing, as in a fresh clone, they begin anew. With --only-plot nothing
+is trained.
 """
 
 from __future__ import annotations
@@ -71,6 +73,13 @@ class Run:
         with self.curve.open(newline="") as file:
             return [{name: float(row[name]) for name in COLUMNS} for row in csv.DictReader(file)]
 
+    def lasted(self, seconds: float) -> bool:
+        """Whether it is complete, and took so much CPU time."""
+        if not self.record.exists():
+            return False
+        done: float = json.loads(self.record.read_text())["cpu_s"]
+        return done >= 0.99 * seconds
+
     def train(self, seconds: float) -> None:
         """Until it has taken so much CPU time, checkpoints of earlier calls included."""
         import torch
@@ -98,10 +107,8 @@ class Run:
         from replay import Policy
 
         rate = success_rate(self.task, Policy.load(self.policy), **TASKS[self.task])
-        done = {"test_success": rate, "steps": int(rows[-1]["steps"]), "cpu_s": round(spent, 1)}
+        done = {"test_success": rate, "steps": int(rows[-1]["steps"]), "cpu_s": round(spent, 3)}
         self.record.write_text(json.dumps(done) + "\n")
-        self.model.unlink()
-        self.buffer.unlink(missing_ok=True)
 
     def _begin(self, goes_on: bool) -> tuple[Any, Any]:
         from ruedo.gym.sb3 import SB3VecEnv
@@ -246,7 +253,7 @@ def main() -> None:
     seeds = range(1, given.seeds + 1)
     for task, algorithm, seed in itertools.product(given.tasks, given.algorithms, seeds):
         run = Run(given.out, task, algorithm, seed)
-        if not given.only_plot and not run.record.exists():
+        if not given.only_plot and not run.lasted(60.0 * given.minutes):
             run.train(60.0 * given.minutes)
     runs = [Run(given.out, *what) for what in itertools.product(TASKS, ALGORITHMS, range(1, 100))]
     if _groups(runs):
