@@ -3,22 +3,13 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <sstream>
 #include <vector>
 
-#include <sys/stat.h>
+#include "bus/udp_sockets.h"
 
 namespace ruedo::bus {
 namespace {
-
-std::optional<std::string> text_of(const char* file) {
-  std::ifstream in(file);
-  if (!in) return std::nullopt;
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 std::vector<std::string> words_of(const std::string& line) {
   std::istringstream in(line);
@@ -27,9 +18,7 @@ std::vector<std::string> words_of(const std::string& line) {
   return words;
 }
 
-int64_t number(const std::string& text, int base = 10) {
-  return std::strtoll(text.c_str(), nullptr, base);
-}
+int64_t number(const std::string& text) { return std::strtoll(text.c_str(), nullptr, 10); }
 
 // "Udp: InDatagrams NoPorts ... RcvbufErrors ...", and below it the values.
 int64_t receive_buffer_errors(const std::string& snmp) {
@@ -51,17 +40,9 @@ int64_t receive_buffer_errors(const std::string& snmp) {
 DatagramLoss datagram_loss(const std::string& snmp, const std::string& udp, uint16_t port,
                            uint64_t own_inode) {
   DatagramLoss loss{receive_buffer_errors(snmp), 0};
-  std::istringstream in(udp);
-  std::string line;
-  std::getline(in, line);  // the heads
-  while (std::getline(in, line)) {
-    constexpr size_t kLocal = 1, kInode = 9, kDrops = 12;  // columns
-    const std::vector<std::string> words = words_of(line);
-    if (words.size() <= kDrops) continue;
-    const size_t colon = words[kLocal].find(':');
-    if (colon == std::string::npos || number(words[kLocal].substr(colon + 1), 16) != port) continue;
-    if (own_inode != 0 && static_cast<uint64_t>(number(words[kInode])) == own_inode) continue;
-    loss.at_port += number(words[kDrops]);
+  for (const UdpSocket& socket : udp_sockets(udp)) {
+    if (socket.port == port && (own_inode == 0 || socket.inode != own_inode))
+      loss.at_port += socket.drops;
   }
   return loss;
 }
@@ -72,9 +53,8 @@ std::optional<DatagramLoss> datagram_loss(uint16_t port, uint64_t own_inode) {
   return datagram_loss(*snmp, *udp, port, own_inode);
 }
 
-DatagramLossWatch::DatagramLossWatch(uint16_t port, int own_socket) : port_(port), own_inode_(0) {
-  struct stat status{};
-  if (::fstat(own_socket, &status) == 0) own_inode_ = status.st_ino;
+DatagramLossWatch::DatagramLossWatch(uint16_t port, int own_socket)
+    : port_(port), own_inode_(inode_of(own_socket)) {
   look();
 }
 

@@ -17,6 +17,7 @@
 #include <spdlog/spdlog.h>
 
 #include "bus/stream_socket.h"
+#include "bus/udp_sockets.h"
 #include "bus/unix_socket.h"
 #include "ruedo/errors.h"
 
@@ -24,7 +25,8 @@ namespace ruedo::bus {
 
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooks{1000}, kBetweenWarnings{60000};
+constexpr std::chrono::milliseconds kBetweenLooks{1000}, kBetweenWarnings{60000},
+    kUnheard{50};                   // between looks for listeners
 constexpr int kTakenTogether = 64;  // messages between two checks whether the bus is closing
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
 constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
@@ -63,7 +65,7 @@ std::vector<std::string> channel_patterns(const std::vector<std::string>& names)
   return {patterns.begin(), patterns.end()};
 }
 
-LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
+LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)), heard_(url_.scheme != "memq") {
   check_route(url_);
   if (url_.scheme == "unix" || url_.scheme == "tcpq") {
     stream_ = std::make_shared<StreamConnection>(connected_to(url_));
@@ -78,6 +80,10 @@ LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
 
 LcmBus::~LcmBus() { stop(); }
 
+void LcmBus::send_to_listeners_only() {
+  to_listeners_only_ = url_.scheme == "udpm" && url_.option("ttl", "") == "0";
+}
+
 void LcmBus::stop() {
   if (!thread_.joinable()) return;
   stopping_ = true;
@@ -87,6 +93,7 @@ void LcmBus::stop() {
 }
 
 void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {
+  if (to_listeners_only_ && !heard_) return;
   if (size > receive_buffer_ && !told_large_.exchange(true)) {
     spdlog::warn(
         "a message of {} bytes on {} does not fit into a receive buffer of {} bytes: LCM clients "
@@ -164,7 +171,9 @@ void LcmBus::open() {
                              "): run `ruedo doctor`");
     }
     loss_.emplace(static_cast<uint16_t>(url_.port), multicast_->file());
-    return ignore_own();
+    ignore_own();
+    own_inode_ = inode_of(multicast_->file());
+    return look_for_listeners();
   }
   in_ = out_.get();  // messages stay inside of one instance
   subscribe_missing();
@@ -218,15 +227,17 @@ void LcmBus::read() {
   for (;;) {
     const int file = stream_ ? stream_->file() : multicast_ ? multicast_->file() : in_->getFileno();
     pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_.get(), POLLIN, 0}};
-    const int longest = lost    ? static_cast<int>(pause.count())
-                        : loss_ ? static_cast<int>(kBetweenLooks.count())
-                                : -1;
+    const int longest = lost                    ? static_cast<int>(pause.count())
+                        : !heard_ && multicast_ ? static_cast<int>(kUnheard.count())
+                        : loss_                 ? static_cast<int>(kBetweenLooks.count())
+                                                : -1;
     if (::poll(waiting, 2, longest) < 0) {
       if (stopping_) return;
       if (errno != EINTR) std::this_thread::sleep_for(kFirstPause);  // it may fail again
       continue;
     }
     if (loss_) look_for_loss();
+    if (std::chrono::steady_clock::now() >= next_listeners_) look_for_listeners();
     if (waiting[1].revents != 0) {
       if (stopping_) return;
       uint64_t count;
@@ -243,6 +254,13 @@ void LcmBus::read() {
     else
       spdlog::warn("{}: the server has closed the connection; it is looked for again", url_.str());
   }
+}
+
+void LcmBus::look_for_listeners() {
+  if (!to_listeners_only_) return;
+  const bool heard = has_listeners(static_cast<uint16_t>(url_.port), own_inode_);
+  if (heard_.exchange(heard) != heard) ++audience_;
+  next_listeners_ = std::chrono::steady_clock::now() + (heard ? kBetweenLooks : kUnheard);
 }
 
 // Lost datagrams mostly go unnoticed: they are reported here, with the cure.
@@ -297,6 +315,7 @@ bool LcmBus::handle() {
     if (in_->handle() != 0) ++failed_;
     return true;
   }
+  if (!heard_) look_for_listeners();  // the sender expects an answer
   const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
     deliver(channel, data, size);
   };

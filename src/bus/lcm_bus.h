@@ -43,11 +43,16 @@ class LcmBus : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
+  // To be called before listen(). Where messages stay on this machine (multicast with a TTL of 0),
+  // from listen() on nothing is sent while no other program listens at the address. A new listener
+  // is noticed within 50 ms, and before a message of its own is handled.
+  void send_to_listeners_only();
   // For a program that only publishes: notices a server's end and reconnects, as while listening.
   void keep_connected();
   void stop() override;
   // With memq there is only this process.
-  bool is_heard(const std::string&) const override { return url_.scheme != "memq"; }
+  bool is_heard(const std::string&) const override { return heard_; }
+  uint64_t audience() const override { return audience_; }
   // Datagrams; a stream only where its reader does not read.
   bool loses_messages() const override { return url_.scheme == "udpm"; }
   uint64_t failed() const override { return failed_; }
@@ -65,6 +70,7 @@ class LcmBus : public Bus {
   void take_up();  // what listen_to() left
   void read();
   void look_for_loss();
+  void look_for_listeners();
   bool handle();  // what is there
   void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void deliver(std::string_view channel, const uint8_t* data, size_t size);
@@ -76,7 +82,11 @@ class LcmBus : public Bus {
   std::shared_ptr<StreamConnection> stream_;  // with tcpq and unix; under connecting_
   mutable std::mutex connecting_;
   std::optional<DatagramLossWatch> loss_;  // with multicast: of our listeners
-  std::chrono::steady_clock::time_point next_look_, next_warning_;
+  std::chrono::steady_clock::time_point next_look_, next_warning_, next_listeners_;
+  bool to_listeners_only_ = false;
+  uint64_t own_inode_ = 0;  // of the receiver's socket
+  std::atomic<bool> heard_;
+  std::atomic<uint64_t> audience_{0};
   int64_t lost_ = 0, told_lost_ = 0;     // datagrams
   size_t receive_buffer_;                // of clients with this address
   std::atomic<bool> told_large_{false};  // that a message is larger

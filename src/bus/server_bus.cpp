@@ -39,6 +39,12 @@ std::string line_about(const std::string& world) {
   return "pid " + std::to_string(::getpid()) + ", world " + world;
 }
 
+std::unique_ptr<Bus> lcm_bus(const LcmUrl& url) {
+  auto bus = std::make_unique<LcmBus>(url.str());
+  bus->send_to_listeners_only();
+  return bus;
+}
+
 // A multicast port that nothing on this machine uses, with a TCP socket on the same port as the
 // token of it.
 ServerBus on_free_multicast_port(const std::string& world) {
@@ -51,7 +57,7 @@ ServerBus on_free_multicast_port(const std::string& world) {
     if (!bound(SOCK_DGRAM, INADDR_ANY, made.url.port)) continue;  // some LCM program uses it
     if (!claimed_by(made.url).empty()) continue;
     made.claim = std::make_unique<UrlClaim>(made.url, line_about(world));
-    made.bus = std::make_unique<LcmBus>(made.url.str());
+    made.bus = lcm_bus(made.url);
     return made;
   }
   throw EnvironmentError("--lcm auto: no free port was found");
@@ -97,7 +103,7 @@ ServerBus unwatched_bus(const std::string& text, const std::string& world) {
   } else if (made.url.scheme == "unix") {
     made.bus = std::make_unique<UnixServer>(made.url);
   } else {
-    made.bus = std::make_unique<LcmBus>(made.url.str());
+    made.bus = lcm_bus(made.url);
   }
   return made;
 }

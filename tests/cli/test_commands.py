@@ -1,9 +1,11 @@
 """The program as its users start it: exit codes, messages, signals, logs, and the bus."""
 
+import contextlib
 import json
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -230,6 +232,51 @@ def test_lost_datagrams_are_reported_with_their_cure():
     hint = next(line for line in said if line.split()[:2] == ["hint", "datagrams"])
     for line in (warning, hint):
         assert "--lcm unix:///PATH" in line and "net.core.rmem_max" in line
+
+
+def datagrams_sent():
+    heads, values = (
+        line.split()
+        for line in Path("/proc/net/snmp").read_text().splitlines()
+        if line.startswith("Udp: ")
+    )
+    return int(values[heads.index("OutDatagrams")])
+
+
+def listens(port):
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+    listener.bind(("", port))
+    return listener
+
+
+@pytest.mark.skipif(len(socket.if_nameindex()) > 1, reason="not in a network of its own")
+def test_nothing_is_sent_where_nobody_listens():
+    sent = {}
+    for is_heard in (False, True):
+        before = datagrams_sent()
+        with listens(7741) if is_heard else contextlib.nullcontext():
+            address = ["--lcm", url(7741), "--rate", "max", "--duration", "2"]
+            done = ruedo("run", ARENA, *QUICK, *address)
+        assert done.returncode == 0, done.stderr
+        sent[is_heard] = datagrams_sent() - before
+    assert sent[False] <= 2 and sent[True] > 500, sent  # the server tests whether it hears itself
+
+
+def test_a_listener_that_comes_late_is_heard():
+    bus, got = lcm.LCM(url(7743)), []
+    with subprocess.Popen(
+        [RUEDO, "run", ARENA, "--disable", "p3at/camera", "--lcm", url(7743)],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as server:
+        assert "arena" in server.stdout.readline()
+        bus.subscribe("p3at/odometry", lambda channel, data: got.append(data))
+        until = time.monotonic() + PATIENCE
+        while not got and time.monotonic() < until:
+            bus.handle_timeout(1000)
+        server.terminate()
+    assert got
 
 
 def needs(*command):
