@@ -76,7 +76,9 @@ def make_xml(rooms: bench.Rooms) -> str:
 
 def simulated_s(path: Path) -> float:
     """From the first to the last line of a true path, each of which begins with its time."""
-    times = [float(line.split()[0]) for line in path.read_text().splitlines() if line.count(" ") == 7]
+    times = [
+        float(line.split()[0]) for line in path.read_text().splitlines() if line.count(" ") == 7
+    ]
     return times[-1] - times[0] if times else 0.0
 
 

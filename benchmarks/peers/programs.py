@@ -1,5 +1,5 @@
-"""What the peers that are programs share: whether a path is the right program, and a row from two of
-its runs, whose difference is free of start-up and loading.
+"""What the peers that are programs share: whether a path is the right program, and a row from two
+of its runs, whose difference is free of start-up and loading.
 """
 
 from __future__ import annotations
