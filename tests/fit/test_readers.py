@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import gzip
+import math
+import subprocess
+import sys
+from pathlib import Path
 
+import lcm
 import numpy as np
 import pytest
 from conftest import ruedo
 from ruedo.fit import FitError, read
 
+BOT_CORE = """
+package bot_core;
+struct pose_t {
+  int64_t utime; double pos[3]; double vel[3]; double orientation[4];
+  double rotation_rate[3]; double accel[3];
+}
+struct planar_lidar_t {
+  int64_t utime; int32_t nranges; float ranges[nranges];
+  int32_t nintensities; float intensities[nintensities]; float rad0; float radstep;
+}
+"""
 METADATA = "type,diff,\nngear,10,\nencRes,36,\nLi,0.4,\nDi,0.2,0.2\nN,1,\n"
 
 
@@ -63,6 +79,46 @@ def test_csv_with_header(tmp_path):
     assert one.truth.pose.tolist() == [[2, 3, 0], [3, 3, 0.1], [4, 3, 0.2]]
     assert one.wheels.time.tolist() == [1, 3]  # the row with empty cells has no encoders
     assert one.findings == ["columns that are not read: battery"]
+
+
+def test_csv_of_a_spreadsheet(tmp_path):
+    """Semicolons, decimal commas, units, a byte-order mark, an empty cell."""
+    table = tmp_path / "a.csv"
+    text = "Time [s];x (m);y;theta;acc_x [m/s²]\r\n0,5;1,25;-2;0;\r\n1,0;1,5;-2;0,1;3\r\n"
+    table.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    with pytest.raises(FitError, match="a.csv:1: 'acc_x' without 'gyro_x'|'gyro_x'"):
+        read(table)
+    table.write_bytes(b"\xef\xbb\xbf" + text.replace("acc_x", "odd").encode())
+    one = read(table)
+    assert one.truth.time.tolist() == [0.5, 1.0]
+    assert one.truth.pose.tolist() == [[1.25, -2, 0], [1.5, -2, 0.1]]
+    assert one.findings == ["columns that are not read: odd"]
+
+
+def test_lcm_log_of_bot_core(tmp_path):
+    """Types made by lcm-gen of bot_core's fields, on its own channels POSE and LASER."""
+    (tmp_path / "bot.lcm").write_text(BOT_CORE)
+    generator = Path(sys.executable).with_name("lcm-gen")
+    subprocess.run([generator, "-p", "--ppath", tmp_path, tmp_path / "bot.lcm"], check=True)
+    sys.path.insert(0, str(tmp_path))
+    try:
+        import bot_core
+    finally:
+        sys.path.remove(str(tmp_path))
+    log = lcm.EventLog(str(tmp_path / "a.lcm"), "w", overwrite=True)
+    for k in range(1, 4):
+        pose, scan = bot_core.pose_t(), bot_core.planar_lidar_t()
+        pose.utime = scan.utime = k * 1_000_000
+        pose.pos, pose.orientation = [k, 2.0, 0.0], [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
+        scan.nranges, scan.ranges, scan.rad0, scan.radstep = 3, [1.0, 2.0, 3.0], -1.0, 1.0
+        log.write_event(pose.utime, "POSE", pose.encode())
+        log.write_event(scan.utime, "LASER", scan.encode())
+    log.close()
+    one = read(tmp_path / "a.lcm")
+    assert one.truth.time.tolist() == [1, 2, 3]
+    assert one.truth.pose == pytest.approx(np.array([[k, 2, np.pi / 2] for k in (1, 2, 3)]))
+    assert one.scans.ranges.tolist() == [[1, 2, 3]] * 3
+    assert one.scans.angles.tolist() == [-1, 0, 1]
 
 
 @pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
@@ -127,6 +183,60 @@ def test_bags(tmp_path, kind):
     assert found.scans.angles.tolist() == [-1, 0, 1]
 
 
+def test_bag_with_frames_of_its_own(tmp_path):
+    """Frames as the Odometry message has them; the range finder hangs upside down behind a mast."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    one = {name.split("/")[-1]: kind for name, kind in store.types.items()}
+    straight, over = (0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0)
+
+    def header(t, frame):
+        return one["Header"](one["Time"](int(t), 0), frame)
+
+    def moved(t, frame, child, x, y, turn=straight):
+        place = one["Transform"](one["Vector3"](x, y, 0.0), one["Quaternion"](*turn))
+        return one["TransformStamped"](header(t, frame), child, place)
+
+    def odometry(t):
+        pose = one["Pose"](one["Point"](float(t), 0.0, 0.0), one["Quaternion"](*straight))
+        zero = one["Vector3"](0.0, 0.0, 0.0)
+        none = np.zeros(36)
+        return one["Odometry"](
+            header(t, "bot_7/odom_combined"), "bot_7/chassis",
+            one["PoseWithCovariance"](pose, none),
+            one["TwistWithCovariance"](one["Twist"](zero, zero), none),
+        )  # fmt: skip
+
+    def scan(t):
+        rays = np.array([1.0, 2.0, 3.0], np.float32)
+        none = np.zeros(0, np.float32)
+        return one["LaserScan"](header(t, "sick"), -1.0, 0.0, 0.5, 0.0, 0.0, 0.1, 8.0, rays, none)
+
+    fixed = [
+        moved(1, "bot_7/chassis", "mast", 0.3, 0.1),
+        moved(1, "mast", "sick", 0.0, 0.2, over),
+    ]
+    path = tmp_path / "bag"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for topic, name, make in (
+            ("/bot_7/tf", "tf2_msgs/msg/TFMessage", lambda t: one["TFMessage"](
+                [moved(t, "site", "bot_7/odom_combined", 5.0, 6.0)])),
+            ("/tf_static", "tf2_msgs/msg/TFMessage", lambda t: one["TFMessage"](fixed)),
+            ("/bot_7/wheels", "nav_msgs/msg/Odometry", odometry),
+            ("/bot_7/front", "sensor_msgs/msg/LaserScan", scan),
+        ):  # fmt: skip
+            connection = writer.add_connection(topic, name, typestore=store)
+            for t in (1, 2, 3):
+                writer.write(connection, t * 10**9, store.serialize_cdr(make(t), name))
+    found = read(path)
+    assert found.truth.pose == pytest.approx(np.array([[5 + t, 6, 0] for t in (1, 2, 3)]))
+    assert found.scans.mount == pytest.approx([0.3, 0.3, 0])
+    assert found.scans.ranges.tolist() == [[3, 2, 1]] * 3  # turned over, left is right
+    assert found.scans.angles == pytest.approx([0, 0.5, 1])
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
@@ -139,6 +249,14 @@ def test_bags(tmp_path, kind):
         ("a.csv", "time,x,y\n0,1,2\n1,2,3\n", "a.csv:1: 'x' without 'theta'"),
         ("a.csv", "time,left,right\n0,1,2\n1,2\n", "a.csv:3: 2 columns, the first row has 3"),
         ("a.csv", "x,y,theta\n0,1,2\n", "no column 'time'"),
+        ("a.csv", "stamp;pos_x;pos_y\n0;1;2\n", "no column 'time'; allowed are time, x, y, theta"),
+        (
+            "a.csv",
+            "time,x [mm],y,theta\n0,1,2,3\n",
+            "a.csv:1: column 'x [mm]'; the unit of 'x' is m",
+        ),
+        ("a.csv", "time,x,y,theta(deg)\n0,1,2,3\n", "the unit of 'theta' is rad"),
+        ("a.csv", "time\tx\ty\ttheta\n0\t1\t2\tx\n", "a.csv:2: could not convert"),
         ("a.csv", "time,left,right\n" + "5,1,2\n" * 9, "time is 5 s in all rows"),
         (
             "a.csv",

@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import FitError
 from .lcm_log import yaw_of
-from .recording import Array, Commands, Imu, Path, Recording, Scans, Wheels, sorted_rows
+from .recording import Array, Commands, Imu, Path, Recording, Scans, Wheels, composed, sorted_rows
 
 _TYPES = (
     "sensor_msgs/msg/LaserScan",
@@ -56,10 +56,7 @@ def read_bag(file: File) -> Recording:
             )
         elif kind.endswith("JointState") and recording.wheels is None:
             recording.wheels = _wheels(recording, time, values)
-    _use_tf(
-        recording,
-        [one for _, kind, all_of_it in messages if kind.endswith("TFMessage") for one in all_of_it],
-    )
+    _use_tf(recording, messages)
     return recording
 
 
@@ -142,34 +139,87 @@ def _wheels(recording: Recording, time: list[float], values: list[Any]) -> Wheel
     return Wheels(when, turned)
 
 
-def _use_tf(recording: Recording, messages: list[tuple[float, Any]]) -> None:
-    """map->odom beside odom->base is the path after SLAM."""
+def _use_tf(recording: Recording, messages: list[tuple[str, str, list[tuple[float, Any]]]]) -> None:
+    """map->odom beside odom->base is the path after SLAM; base->scan is where the range finder is.
+    Frames are those of the Odometry and LaserScan messages, else those of REP 105, with any prefix.
+    """
     frames: dict[tuple[str, str], list[tuple[float, Any]]] = {}
-    for _, message in messages:
-        for one in message.transforms:
-            key = (one.header.frame_id.strip("/"), one.child_frame_id.strip("/"))
-            frames.setdefault(key, []).append(
-                (one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec, one.transform)
-            )
+    for _, kind, rows in messages:
+        if kind.endswith("TFMessage"):
+            for _, message in rows:
+                for one in message.transforms:
+                    key = (_frame(one.header.frame_id), _frame(one.child_frame_id))
+                    stamp = one.header.stamp
+                    frames.setdefault(key, []).append(
+                        (stamp.sec + 1e-9 * stamp.nanosec, one.transform)
+                    )
+    odom, base = _drive_frames(messages, list(frames))
+    moves = _path_of(frames.get((odom, base), []))
+    recording.odometry = recording.odometry or moves
+    correction = next((_path_of(frames[k]) for k in frames if k[1] == odom), None)
+    if recording.truth is None and correction is not None and recording.odometry is not None:
+        odometry = moves or recording.odometry
+        pose = composed(correction.at(odometry.time), odometry.pose)
+        recording.truth = Path(odometry.time, pose, "/tf map->odom")
+    if recording.scans is not None:
+        scan = next(rows[0][1] for _, kind, rows in messages if kind.endswith("LaserScan"))
+        _use_mount(recording, frames, base, _frame(scan.header.frame_id))
 
-    def path(parent: str, *children: str) -> Path | None:
-        rows = next((frames[parent, child] for child in children if (parent, child) in frames), [])
-        if not rows:
-            return None
-        turns = np.array([[t.rotation.w, *_xyz(t.rotation)] for _, t in rows])
-        place = [[t.translation.x, t.translation.y] for _, t in rows]
-        return Path(np.array([s for s, _ in rows]), np.column_stack([place, yaw_of(turns)]), "/tf")
 
-    odometry = path("odom", "base_footprint", "base_link")
-    recording.odometry = recording.odometry or odometry
-    correction = path("map", "odom")
-    if recording.truth is None and correction is not None and odometry is not None:
-        step = correction.at(odometry.time)
-        sine, cosine = np.sin(step[:, 2]), np.cos(step[:, 2])
-        x, y, theta = odometry.pose.T
-        moved = [
-            step[:, 0] + cosine * x - sine * y,
-            step[:, 1] + sine * x + cosine * y,
-            step[:, 2] + theta,
-        ]
-        recording.truth = Path(odometry.time, np.stack(moved, axis=1), "/tf map->odom")
+def _frame(name: str) -> str:
+    return name.strip("/")
+
+
+def _drive_frames(
+    messages: list[tuple[str, str, list[tuple[float, Any]]]], pairs: list[tuple[str, str]]
+) -> tuple[str, str]:
+    """The frame of the odometry and that of the robot."""
+    for topic, kind, rows in messages:
+        if kind.endswith("Odometry") and topic not in _TRUTHS:
+            found = _frame(rows[0][1].header.frame_id), _frame(rows[0][1].child_frame_id)
+            if found in pairs or any(child == found[0] for _, child in pairs):
+                return found
+    for base in ("base_footprint", "base_link"):
+        for parent, child in pairs:
+            if parent.split("/")[-1] == "odom" and child.split("/")[-1] == base:
+                return parent, child
+    return "odom", "base_link"
+
+
+def _path_of(rows: list[tuple[float, Any]]) -> Path | None:
+    if not rows:
+        return None
+    turns = np.array([[t.rotation.w, *_xyz(t.rotation)] for _, t in rows])
+    place = [[t.translation.x, t.translation.y] for _, t in rows]
+    return Path(np.array([s for s, _ in rows]), np.column_stack([place, yaw_of(turns)]), "/tf")
+
+
+def _use_mount(
+    recording: Recording,
+    frames: dict[tuple[str, str], list[tuple[float, Any]]],
+    base: str,
+    scan: str,
+) -> None:
+    """The first transforms from the robot to the scans' frame. Turned over, it counts the rays the
+    other way around.
+    """
+    scans = recording.scans
+    assert scans is not None
+    parents = {child: parent for parent, child in frames}
+    chain: list[Any] = []
+    while scan in parents and scan != base and len(chain) < len(frames):
+        chain.append(frames[parents[scan], scan][0][1])
+        scan = parents[scan]
+    if scan != base:
+        return
+    mount, over = np.zeros((1, 3)), False
+    for one in reversed(chain):
+        q = one.rotation
+        place = [one.translation.x, one.translation.y]
+        step = np.array([[*place, float(yaw_of(np.array([[q.w, *_xyz(q)]]))[0])]])
+        mount = composed(mount, step * ([1, -1, -1] if over else [1, 1, 1]))
+        over ^= 1 - 2 * (q.x * q.x + q.y * q.y) < 0
+    scans.mount = mount[0]
+    if over:
+        scans.ranges = scans.ranges[:, ::-1]
+        scans.angle_min = -float(scans.angles[-1])

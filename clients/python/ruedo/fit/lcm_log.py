@@ -36,7 +36,9 @@ _TYPES = (
 
 
 def read_lcm(file: File, robot: str = "") -> Recording:
-    """robot: whose channels; "": that of the first odometry or scan. Raises FitError."""
+    """robot: whose channels; "": those of the only one, or of none, as bot_core's. Raises
+    FitError.
+    """
     types = {getattr(lcmtypes, name)._get_packed_fingerprint(): name for name in _TYPES}
     found: dict[str, dict[str, list[Any]]] = {name: {} for name in _TYPES}
     for event in events(file):
@@ -52,7 +54,7 @@ def read_lcm(file: File, robot: str = "") -> Recording:
             if name == "velocity_command_t":  # its own stamp is informational
                 message.utime = event.timestamp
             found[name].setdefault(event.channel, []).append(message)
-    robots = {channel.split("/")[0] for name in _TYPES[1:4] for channel in found[name]}
+    robots = {_robot_of(channel) for name in _TYPES[1:4] for channel in found[name]} - {""}
     if robot and robot not in robots:
         raise FitError(f"{file}: no robot '{robot}'; it has {', '.join(sorted(robots)) or 'none'}")
     if not robot:
@@ -62,16 +64,29 @@ def read_lcm(file: File, robot: str = "") -> Recording:
             )
         robot = next(iter(robots), "")
     recording = Recording(file, "LCM log")
-    own = {
-        name: next((m for c, m in sorted(every.items()) if c.split("/")[0] == robot), [])
-        for name, every in found.items()
-    }
+    own = {name: _own(recording, name, every, robot) for name, every in found.items()}
     own["pose_t"] = found["pose_t"].get(f"{robot}/pose", own["pose_t"])
     _fill(recording, own)
     infos = next(iter(found["world_info_t"].values()), [])
     if infos:
         _use_info(recording, infos[-1], robot)
     return recording
+
+
+def _robot_of(channel: str) -> str:
+    """ "" for a channel that is not of a robot, as bot_core's POSE and LASER."""
+    return channel.split("/")[0] if "/" in channel else ""
+
+
+def _own(recording: Recording, name: str, every: dict[str, list[Any]], robot: str) -> list[Any]:
+    """The messages of a type on the first channel of the robot, else on the first of none."""
+    for owner in (robot, ""):
+        channels = sorted(one for one in every if _robot_of(one) == owner)
+        if channels:
+            if len(channels) > 1 and name == "planar_lidar_t":
+                recording.findings.append(f"range finders {', '.join(channels)}: the first is read")
+            return every[channels[0]]
+    return []
 
 
 def _add_command(commands: dict[str, list[Any]], applied: Any) -> None:

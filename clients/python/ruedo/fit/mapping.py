@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from .errors import FitError
-from .recording import Array, Recording
+from .recording import Array, Recording, composed
 
 _KEY_M, _KEY_RAD = 0.1, np.radians(5)  # between scans that count
 _FARTHEST_M = 25.0  # of what a ray shows to be free
@@ -21,6 +21,7 @@ _WALL = 0.25  # least share of the scans at a cell that end there
 _LEAST_HITS = 2
 _MOVED_HITS, _MOVED_CELLS = 3, 4
 _MOST_CELLS = 100_000_000
+_NO_PATH = "the log has no corrected path: walls follow the robot's own odometry, which drifts"
 FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # grey, as map_server has it
 
 
@@ -61,9 +62,9 @@ def own_mount(recording: Recording) -> Array:
     return scans.mount if known else np.zeros(3)  # type: ignore[union-attr, return-value]
 
 
-def scan_poses(recording: Recording, mount: Array) -> Array:
-    """(N, 3) poses of the range finder in the world. mount: x, y, heading on the robot. Raises
-    FitError.
+def scan_poses(recording: Recording, mount: Array, later: float = 0.0) -> Array:
+    """(N, 3) poses of the range finder in the world. mount: x, y, heading on the robot. later: s
+    between the time of a scan and that of its pose on the path. Raises FitError.
     """
     recording.need("scans", "scans are needed")
     scans = recording.scans
@@ -75,11 +76,10 @@ def scan_poses(recording: Recording, mount: Array) -> Array:
         if path is None:
             recording.need("odometry", "a path is needed (SLAM, /tf map->odom, ROBOT/pose)")
             path = recording.odometry
-            recording.findings.append(
-                "the log has no corrected path: walls follow the robot's own odometry, which drifts"
-            )
+            if _NO_PATH not in recording.findings:
+                recording.findings.append(_NO_PATH)
         assert path is not None
-        robot = path.at(scans.time)
+        robot = path.at(scans.time + later)
         outside = (scans.time < path.time[0]) | (scans.time > path.time[-1])
         robot[outside] = np.nan
         if outside.all():
@@ -87,16 +87,7 @@ def scan_poses(recording: Recording, mount: Array) -> Array:
                 f"{recording.file}: no scan lies within the path's times ({path.time[0]:g} to "
                 f"{path.time[-1]:g} s): the clocks or the units may differ"
             )
-    sine, cosine = np.sin(robot[:, 2]), np.cos(robot[:, 2])
-    x, y, heading = mount
-    return np.stack(
-        [
-            robot[:, 0] + cosine * x - sine * y,
-            robot[:, 1] + sine * x + cosine * y,
-            robot[:, 2] + heading,
-        ],
-        axis=1,
-    )
+    return composed(robot, np.broadcast_to(mount, robot.shape))
 
 
 def key_scans(poses: Array) -> NDArray[np.int64]:

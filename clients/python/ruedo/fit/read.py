@@ -14,7 +14,7 @@ from .carmen import LINES, read_carmen
 from .errors import FitError
 from .lcm_log import read_lcm
 from .recording import Array, Recording
-from .tables import COLUMNS, read_csv, read_encoder_table
+from .tables import cells_of, read_csv, read_encoder_table
 
 KINDS = (
     "CARMEN log, LCM log, ROS 1 or 2 bag (.bag, sqlite3, MCAP), encoder table with its metadata, "
@@ -58,14 +58,12 @@ def _read(file: File, robot: str) -> Recording:
         return read_lcm(file, robot)
     if head.startswith((b"#ROSBAG", b"\x89MCAP", b"SQLite format 3")):
         return read_bag(file)
-    first = head.decode("utf-8", "replace").split("\n")[0].strip()
+    first = head.decode("utf-8-sig", "replace").split("\n")[0].strip()
     if first.split(" ")[0] in LINES or first.startswith("#"):
         return read_carmen(file)
-    cells = [cell.strip().lower() for cell in first.split(",")]
-    if len(cells) > 1 and _is_number(cells[0]):
-        return read_encoder_table(file)
-    if len(cells) > 1 and any(cell in COLUMNS for cell in cells):
-        return read_csv(file)
+    cells = cells_of(first)
+    if len(cells) > 1:
+        return read_encoder_table(file) if _is_number(cells[0]) else read_csv(file)
     raise FitError(f"{file}: it begins with '{first[:40]}'; allowed are {KINDS}")
 
 

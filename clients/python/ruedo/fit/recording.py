@@ -142,6 +142,20 @@ def body_steps(pose: Array) -> Array:
     return np.stack([ahead * stretch, left * stretch, step[:, 2]], axis=1)
 
 
+def composed(first: Array, then: Array) -> Array:
+    """(N, 3): poses (N, 3) of things whose poses `then` (N, 3) are as seen from poses `first`."""
+    sine, cosine = np.sin(first[:, 2]), np.cos(first[:, 2])
+    x, y, heading = then.T
+    return np.stack(
+        [
+            first[:, 0] + cosine * x - sine * y,
+            first[:, 1] + sine * x + cosine * y,
+            first[:, 2] + heading,
+        ],
+        axis=1,
+    )
+
+
 def wrapped(angle: Array) -> Array:
     """Into [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

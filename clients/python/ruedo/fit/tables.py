@@ -56,16 +56,27 @@ def text_of(file: File) -> str:
             raise FitError(f"{file}: the compressed file is damaged: {error}") from None
     if len(content) > MOST_BYTES:
         raise FitError(f"{file}: more than {MOST_BYTES} bytes of text; split the log")
-    return content.decode("utf-8", "replace")
+    return content.decode("utf-8-sig", "replace")
+
+
+def cells_of(line: str) -> list[str]:
+    """The cells of a row, between semicolons, tabs or commas; but for the last, a comma in a number
+    is a decimal one.
+    """
+    for separator in (";", "\t"):
+        if separator in line:
+            return [cell.strip().replace(",", ".") for cell in line.split(separator)]
+    return [cell.strip() for cell in line.split(",")]
 
 
 def _rows(file: File, lines: list[str], first: int, width: int) -> Array:
+    """An empty cell is NaN."""
     rows = []
     for number, line in enumerate(lines, first):
         if not line.strip():
             continue
         try:
-            row = [float(cell) for cell in line.split(",")]
+            row = [float(cell or "nan") for cell in cells_of(line)]
         except ValueError as error:
             raise FitError(f"{file}:{number}: {error}; a number is allowed ({_UNITS})") from None
         if len(row) != width:
@@ -79,7 +90,7 @@ def _rows(file: File, lines: list[str], first: int, width: int) -> Array:
 def read_encoder_table(file: File) -> Recording:
     """Raises FitError, also where the metadata is missing: ticks alone have no unit."""
     lines = text_of(file).splitlines()
-    rows = _rows(file, lines, 1, lines[0].count(",") + 1)
+    rows = _rows(file, lines, 1, len(cells_of(lines[0])))
     if not np.isfinite(rows).all():
         bad = 1 + int(np.argmin(np.isfinite(rows).all(axis=1)))
         raise FitError(f"{file}:{bad}: finite numbers are allowed ({_UNITS})")
@@ -141,19 +152,28 @@ def _of(metadata: dict[str, list[str]], key: str) -> float:
     return value
 
 
+def _column(file: File, cell: str) -> str:
+    """The name of a column. Raises FitError where the header has another unit for it: "x [mm]"."""
+    match = re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]", cell.strip("\"' ").lower())
+    name, unit = match.groups() if match else (cell.strip("\"' ").lower(), "")
+    allowed = COLUMNS.get(name, "").split(",")[0]
+    if allowed and unit and unit.replace("^", "").replace("²", "2") != allowed.replace("^", ""):
+        raise FitError(f"{file}:1: column '{cell}'; the unit of '{name}' is {allowed}")
+    return name
+
+
 def read_csv(file: File) -> Recording:
-    """A CSV whose header names COLUMNS, in any order; others are ignored, which is reported. An
-    empty cell or "nan" is a row without that stream.
+    """A CSV whose header names COLUMNS, in any order, with units or without; others are ignored,
+    which is reported. An empty cell or "nan" is a row without that stream.
     """
     lines = text_of(file).splitlines()
-    header = [name.strip().lower() for name in lines[0].split(",")]
+    header = [_column(file, name) for name in cells_of(lines[0])]
     if "time" not in header:
         raise FitError(f"{file}:1: no column 'time'; allowed are {', '.join(COLUMNS)}")
     double = sorted({name for name in header if name and header.count(name) > 1})
     if double:
         raise FitError(f"{file}:1: column '{double[0]}' is there twice")
-    filled = [re.sub(r"(^|,)\s*(?=,|$)", r"\1nan", line) if line.strip() else "" for line in lines]
-    rows = _rows(file, filled[1:], 2, len(header))
+    rows = _rows(file, lines[1:], 2, len(header))
     recording = Recording(file, "CSV file")
     unknown = [name for name in header if name not in COLUMNS]
     if unknown:
