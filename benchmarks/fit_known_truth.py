@@ -1,7 +1,7 @@
 """How well `ruedo fit` finds known errors: drawn sets of three robots in three worlds.
 
 Run as PYTHONPATH=build/release/python .venv/bin/python benchmarks/fit_known_truth.py [SETS [PART]].
-PART: odometry (two seconds of CPU a set), ranges (twenty), motion or lag (two). Prints a Markdown
+PART: odometry (two seconds of CPU a set), ranges (eight), motion or lag (two). Prints a Markdown
 table for docs/reality.md; Ctrl-C ends it with the sets done so far.
 """
 
@@ -20,13 +20,24 @@ sys.path.insert(0, str(ROOT / "tests/fit"))
 from drives import SQUARE, drive, integrated
 from ruedo import World
 from ruedo.fit import read
-from ruedo.fit.fitting import fit, read_robot
+from ruedo.fit.fitting import fit, mount_on, read_robot
 from ruedo.fit.motion import fit_motion
+from ruedo.fit.rangefinder import fit_rangefinder
 from ruedo.fit.recording import Commands
 
 ROBOTS = ("p3at", "p3dx", "crawler")
 PARTS = ("odometry", "ranges", "motion", "lag")
 WORLDS = ("empty", "room", "hall")
+TO_SEE = ("room", "hall", "pillars")  # an empty one shows a range finder nothing
+MISPLACED = (0.05, 0.05, 0.02)  # m, m, rad: at most, of a range finder
+UNITS = {  # factor and unit of errors that are not relative
+    "delay": (1000, "ms"),
+    "time offset": (1000, "ms"),
+    "mounting ahead": (1000, "mm"),
+    "mounting left": (1000, "mm"),
+    "mounting angle": (1000, "mrad"),
+}
+LATE = 0.05  # s, at most, of its clock
 MOCAP = 5e-4  # m and rad, of a pose of the path that motion is fitted to
 
 
@@ -36,6 +47,11 @@ def build(name):
     if name == "room":
         for ends in ((-4, -4, 4, -4), (4, -4, 4, 4), (4, 4, -4, 4), (-4, 4, -4, -4), (2, 4, 2, 3)):
             world.wall(*ends)
+    if name == "pillars":
+        for ends in ((-6, -5, 6, -5), (6, -5, 6, 5), (6, 5, -6, 5), (-6, 5, -6, -5)):
+            world.wall(*ends)
+        for x, y in ((-3.5, 2.5), (3, 3), (-3, -3), (3.5, -2.5), (4.5, 0.5)):
+            world.cylinder(x, y, radius=0.2 + abs(x) / 20, height=1.0)
     if name == "hall":
         for ends in ((-9, -4, 9, -4), (9, -4, 9, 4), (9, 4, -9, 4), (-9, 4, -9, -4)):
             world.wall(*ends)
@@ -91,13 +107,25 @@ def truth_of_motion(drive_, delay, dead):
     }
 
 
-def truth_of(part, robot, drive_, beams):
+def fit_ranges(recording, robot, beams, rng):
+    """Estimates and truth of a range finder whose mount is believed elsewhere, and whose clock is
+    off.
+    """
+    late, mount = rng.uniform(-LATE, LATE), mount_on(recording, robot)
+    recording.scans.time += late
+    found = fit_rangefinder([recording], mount + rng.uniform(-1, 1, 3) * MISPLACED)[1]
+    return found, {
+        "range noise": beams["lrf.lidar.noise.stddev"],
+        "bearing noise": beams["lrf.bearing_noise"],
+        "mounting ahead": mount[0],
+        "mounting left": mount[1],
+        "mounting angle": mount[2],
+        "time offset": late,
+    }
+
+
+def truth_of_odometry(robot, drive_):
     """The values that a fit should find, by name."""
-    if part == "ranges":
-        return {
-            "range noise": beams["lrf.lidar.noise.stddev"],
-            "bearing noise": beams["lrf.bearing_noise"],
-        }
     lever, slip = robot.geometry.track_m, drive_["odometry.slip_noise"]
     left, right = map(float, drive_["odometry.radius_error"].split())
     return {
@@ -117,10 +145,10 @@ def truth_of(part, robot, drive_, beams):
 
 def one_set(number, part, folder):
     """The world, and [(name, truth, estimate)] of one drive; a course that touches something is
-    drawn anew. An empty world shows the range finder nothing.
+    drawn anew.
     """
     rng = np.random.default_rng(number)
-    worlds = WORLDS[1:] if part == "ranges" else WORLDS
+    worlds = TO_SEE if part == "ranges" else WORLDS
     robot, world = ROBOTS[number % 3], worlds[number // 3 % len(worlds)]
     place = folder / f"{world}.sdf"
     place.write_text(build(world))
@@ -152,9 +180,11 @@ def one_set(number, part, folder):
         recording.truth.pose += rng.normal(0, MOCAP, recording.truth.pose.shape)
         found = fit_motion(recording)
         true = truth_of_motion(drive_, delay, dead)
+    elif sees:
+        found, true = fit_ranges(recording, nominal, beams, rng)
     else:
         found = [one for part in fit([recording], nominal).parts.values() for one in part]
-        true = truth_of(part, nominal, drive_, beams)
+        true = truth_of_odometry(nominal, drive_)
     found = {one.name: one for one in found}
     return world, [(name, value, found[name]) for name, value in true.items() if name in found]
 
@@ -198,7 +228,7 @@ def main(sets, part):
         known = [(true, one) for true, one in every if one.value is not None]
         inside = sum(one.low <= true <= one.high for true, one in known)
         total, held = total + len(known), held + inside
-        scale, unit = (1000, "ms") if name.endswith("delay") else (100, "%")
+        scale, unit = UNITS.get(name.split(": ")[-1], (100, "%"))
         relative = unit == "%" and not name.endswith("error")
         errors = [abs(one.value - true) / (abs(true) if relative else 1) for true, one in known]
         middle, most = np.quantile(errors, [0.5, 0.9]) * scale if errors else (np.nan, np.nan)

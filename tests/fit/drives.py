@@ -11,7 +11,7 @@ from ruedo.fit.recording import Commands, Path, Recording
 SQUARE = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, -1.0))
 LEGS = (*SQUARE, (0.8, 0.7), (0.8, -0.7))
 _HEAVY = ("camera", "sonar")
-_STEP_S = 0.001
+_STEP_S = 1e-4  # a limit or a lag ends within a step: 1 ms was seen in accelerations
 
 
 def leaves(engine, place):
@@ -66,7 +66,7 @@ def integrated(
     seed: int, delay: float, rise: float, fall: float, lag: float, *, seconds=40.0, rate=50.0,
     dead=0.0, limit=np.inf,
 ) -> Recording:  # fmt: skip
-    """A drive on a plane by commands at chance times, integrated in steps of 1 ms."""
+    """A drive on a plane by commands at chance times, integrated in steps of _STEP_S."""
     draw = np.random.default_rng(seed)
     when = np.cumsum(np.concatenate([[0.5], draw.uniform(0.4, 2.0, 2 * int(seconds))]))
     when = when[when < seconds - 2]

@@ -11,6 +11,7 @@ from conftest import ruedo
 from drives import drive
 from ruedo.fit import FitError, read
 from ruedo.fit.rangefinder import Residuals, fit_beams, fit_rangefinder
+from ruedo.fit.recording import Path, Recording, Scans, composed
 from test_import import room_scan
 from test_readers import flaser
 
@@ -23,7 +24,7 @@ def test_beam_model_of_drawn_residuals():
     residual = 0.004 + sigma * rng.normal(size=20_000)
     others = rng.random(20_000) < 0.05
     residual[others] = rng.uniform(-0.3, 0.3, others.sum())
-    model, std = fit_beams(Residuals(residual, reach, incidence, sigma, 1.0))
+    model, std = fit_beams(Residuals(residual, reach, incidence, 1.0))
     assert model.range_sigma == pytest.approx(0.01, rel=0.05)
     assert model.bearing_sigma == pytest.approx(0.002, rel=0.05)
     assert model.bias == pytest.approx(0.004, abs=5e-4)
@@ -89,11 +90,64 @@ def test_known_truth_of_ruedo(tmp_path):
     assert "good" in ruedo("check", out)[0]
 
 
+def test_place_and_clock_of_the_range_finder(tmp_path):
+    """Made scans from a range finder at (0.2, -0.1) m, 0.05 rad on the robot, stamped 0.04 s late;
+    believed 6 cm and 0.03 rad from there.
+    """
+    rng = np.random.default_rng(3)
+    time = np.arange(0, 64, 0.4)
+
+    def robot(t):
+        return np.stack([1.5 * np.cos(t / 5), np.sin(t / 3), np.sin(t / 4) * 3 + t / 9], axis=-1)
+
+    mount, late = np.array([0.2, -0.1, 0.05]), 0.04
+    poses = composed(robot(time - late), np.tile(mount, (len(time), 1)))
+    ranges = np.array([room_scan(pose) for pose in poses]) + 0.01 * rng.normal(
+        size=(len(time), 181)
+    )
+    fine = np.arange(-1, 91, 0.02)
+    recording = Recording(
+        tmp_path / "made.csv",
+        "CSV",
+        truth=Path(fine, robot(fine), "exact"),
+        scans=Scans(time, ranges, -math.pi / 2, math.pi / 180, np.inf),
+    )
+    believed = np.array([0.16, -0.05, 0.02])
+    found = {one.name: one for one in fit_rangefinder([recording], believed)[1]}
+    names = ("mounting ahead", "mounting left", "mounting angle", "time offset")
+    for name, true, close in zip(names, (*mount, late), (2e-3, 2e-3, 1e-3, 1e-3)):
+        one = found[name]
+        assert one.value == pytest.approx(true, abs=close), name
+        assert abs(one.value - true) < (one.high - one.low) / 2 * 1.7, name  # beyond in 1 of 1000
+    assert found["range noise"].value == pytest.approx(0.01, rel=0.05)
+    recording.truth = Path(fine, np.zeros((len(fine), 3)), "exact")  # a robot at rest: one place
+    with pytest.raises(FitError, match="scans from 1 places; a drive is needed"):
+        fit_rangefinder([recording], np.zeros(3))
+
+
+def test_what_a_drive_does_not_show_of_the_mount(tmp_path):
+    """Straight ahead, the place of the range finder on the robot changes nothing."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0, 60, 0.25)
+    poses = np.stack([time / 16 - 2, 0 * time, 0 * time], axis=1)
+    ranges = np.array([room_scan(pose) for pose in poses]) + 0.01 * rng.normal(
+        size=(len(time), 181)
+    )
+    scans = Scans(time, ranges, -math.pi / 2, math.pi / 180, np.inf)
+    recording = Recording(tmp_path / "a.csv", "CSV", truth=Path(time, poses, "exact"), scans=scans)
+    found = {one.name: one for one in fit_rangefinder([recording], np.zeros(3))[1]}
+    for name in ("mounting ahead", "mounting left", "time offset"):
+        assert found[name].value is None, name
+    assert found["mounting left"].why == "the drive has too few turns"
+    assert found["mounting angle"].value == pytest.approx(0, abs=2e-3)
+    assert "farther away" in next(one.why for name, one in found.items() if "beyond" in name)
+
+
 def test_scans_without_any_return(tmp_path):
     log = tmp_path / "nothing.log"
     poses = [(0.2 * k, 0, 0) for k in range(9)]
     log.write_text("".join(flaser([80.0] * 181, pose, k) for k, pose in enumerate(poses)))
-    with pytest.raises(FitError, match="no reading lies on a surface that other scans saw"):
+    with pytest.raises(FitError, match="0 ranges; at least 500 are needed"):
         fit_rangefinder([read(log)], np.zeros(3))
 
 

@@ -76,25 +76,26 @@ def fit_walk(groups: list[tuple[Array, Array]]) -> Walk:
         method="Nelder-Mead",
         options={"xatol": 1e-3, "fatol": 1e-4, "maxiter": 600, "adaptive": True},
     )
-    return Walk(np.exp(best.x[:-1]), float(np.exp(best.x[-1])), _relative_std(cost, best.x))
+    stds = stds_of(cost, best.x, np.full(size + 1, 0.05))
+    return Walk(np.exp(best.x[:-1]), float(np.exp(best.x[-1])), stds[:-1])
 
 
-def _relative_std(cost: Callable[[Array], float], logs: Array) -> Array:
-    """The relative standard deviation of each variance, by the curvature of the likelihood; inf
-    without one.
+def stds_of(cost: Callable[[Array], float], x: Array, steps: Array) -> Array:
+    """Standard deviations of the most likely values, logarithms for the most part, by the curvature
+    of cost(), a negative log-likelihood, over these steps; inf without one.
     """
-    size, step = len(logs), 0.05
+    size = len(x)
     hessian = np.zeros((size, size))
-    unit = np.eye(size) * step
+    unit = np.diag(steps)
     for i in range(size):
         for j in range(i + 1):
             corners = [
-                a * b * cost(logs + a * unit[i] + b * unit[j]) for a in (1, -1) for b in (1, -1)
+                a * b * cost(x + a * unit[i] + b * unit[j]) for a in (1, -1) for b in (1, -1)
             ]
-            hessian[i, j] = hessian[j, i] = sum(corners) / (4 * step**2)
+            hessian[i, j] = hessian[j, i] = sum(corners) / (4 * steps[i] * steps[j])
     free = np.diag(hessian) > 0.05  # others do not matter to the likelihood, such as r = 0
     answer = np.full(size, np.inf)
     if free.any():
         inverse = np.linalg.pinv(hessian[np.ix_(free, free)])
         answer[free] = np.sqrt(np.maximum(np.diag(inverse), 0))
-    return answer[:-1]
+    return answer
