@@ -24,8 +24,8 @@ std::optional<std::string> text_of(const std::string& file);
 uint64_t inode_of(int file);
 
 // Whether some socket but our own receives what is sent to that port on this machine: without one,
-// a datagram with a TTL of 0 reaches no program. True where the system does not say. Programs that
-// watch the network itself (tcpdump) are not seen.
+// a datagram with a TTL of 0 reaches no program. True where the system does not list even our own.
+// Programs that watch the network itself (tcpdump) are not seen.
 bool has_listeners(uint16_t port, uint64_t own_inode);
 
 }  // namespace ruedo::bus

@@ -69,5 +69,10 @@ TEST(UdpSockets, ListenersAreAllButOurOwn) {
   EXPECT_FALSE(has_listeners(port, inode_of(own.get())));
 }
 
+TEST(UdpSockets, ThereMayBeListenersWhereTheSystemDoesNotListOurOwn) {
+  constexpr uint16_t kNobodys = 1;
+  EXPECT_TRUE(has_listeners(kNobodys, 12345));
+}
+
 }  // namespace
 }  // namespace ruedo::bus
