@@ -64,14 +64,18 @@ def drive(
 
 def integrated(
     seed: int, delay: float, rise: float, fall: float, lag: float, *, seconds=40.0, rate=50.0,
-    dead=0.0, limit=np.inf,
+    dead=0.0, limit=np.inf, only=0.0,
 ) -> Recording:  # fmt: skip
-    """A drive on a plane by commands at chance times, integrated in steps of _STEP_S."""
+    """A drive on a plane by commands at chance times, integrated in steps of _STEP_S. only: the size
+    of all commands.
+    """
     draw = np.random.default_rng(seed)
     when = np.cumsum(np.concatenate([[0.5], draw.uniform(0.4, 2.0, 2 * int(seconds))]))
     when = when[when < seconds - 2]
     value = np.zeros((len(when), 3))
     value[:, 0], value[:, 2] = draw.uniform(-0.6, 0.7, len(when)), draw.uniform(-1, 1, len(when))
+    if only:
+        value = only * np.sign(value)
     time = np.arange(0, seconds, _STEP_S)
     last = np.searchsorted(when, time - delay, side="right") - 1
     wanted = np.where(last[:, None] >= 0, value[np.maximum(last, 0)], 0.0)

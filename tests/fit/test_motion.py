@@ -54,6 +54,15 @@ def test_dead_zone_and_speed_limit():
     assert "no command of up to 0.6" in found["speed: limit"].why
 
 
+def test_one_speed_shows_no_limit():
+    """What is always commanded 0.3 and drives 0.3 may drive faster."""
+    found = by_name(integrated(4, 0.1, 1.0, 1.0, 0.05, only=0.3))
+    for axis in ("speed", "turn rate"):
+        assert found[f"{axis}: limit"].value is None
+        assert found[f"{axis}: gain"].value == pytest.approx(1.0, rel=0.01)
+        assert found[f"{axis}: delay"].value == pytest.approx(0.1, abs=0.001)
+
+
 def test_path_in_other_units_or_at_rest():
     recording = integrated(3, 0.05, 0.5, 0.5, 0.1)
     recording.truth.pose[:, :2] *= 1000

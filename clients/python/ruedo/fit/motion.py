@@ -202,7 +202,16 @@ class _Axis:
             self.walk = None
             self.walk = fit_walk([(self.residuals(x), self.clock)])
             self._find_dead_zone(x)
-        return self._descend(x)
+        return self._without_limit(self._descend(x))
+
+    def _without_limit(self, x: Array) -> Array:
+        """Where no limit is nearly as likely: of a robot that gets one speed only, gain and limit
+        look alike.
+        """
+        most = float(np.abs(self.value).max())
+        gain = min(x[4], x[5] - math.log(most))
+        free = self._descend(np.array([*x[:4], gain, self.high[5]]))
+        return free if self.cost(free) - self.cost(x) < _MORE_LIKELY else x
 
     def _descend(self, x: Array) -> Array:
         x = np.clip(x, _LOW + 1e-9, self.high - 1e-9)
@@ -235,8 +244,8 @@ class _Axis:
         most = float(np.abs(self.value).max())
         if x[3] < _LOW[3] + 0.7:
             stds[3] = np.inf
-        if self.cost(np.append(x[:5], self.high[5])) - self.cost(x) < _MORE_LIKELY:
-            stds[5] = np.inf  # the largest command itself looks like a limit
+        if x[5] > self.high[5] - 1e-3:
+            stds[5] = np.inf  # beyond the largest command
         for k, what, per, why in (
             (1, "acceleration", f"{unit}^2", "commands do not reach the limit"),
             (2, "deceleration", f"{unit}^2", "commands do not reach the limit"),

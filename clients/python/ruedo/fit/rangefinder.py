@@ -336,9 +336,8 @@ def fit_rangefinder(
     why = "surfaces farther away are needed"
     estimates.append(Estimate(f"noise beyond {farthest:.2g} m", None, why=why))
     estimates.append(Estimate("bias of the range", None, why="surfaces are the range finder's own"))
-    share = max(model.outliers, 0.0)
-    std = np.sqrt(share * (1 - share) / len(reach))
-    estimates.append(normal("share of short and mixed returns", share, float(std)))
+    name = "share of short and mixed returns"
+    estimates.append(_share(name, model.outliers, len(reach), "near flat surfaces"))
     estimates += _place_estimates(place)
     return model, estimates + _no_returns(recording, keys) + _resolution(recording)
 
@@ -361,21 +360,15 @@ def _no_returns(recording: Recording, keys: NDArray[np.int64]) -> list[Estimate]
     seen = data.ranges[keys]
     lost = ~np.isfinite(seen) | (seen >= data.max_range)
     count, missing = seen.size, int(lost.sum())
-    share = missing / count
-    std = np.sqrt(max(share * (1 - share), 1 / count) / count)
     why = (
         "of all beams: open space is in it; by range, incidence and reflectance it needs the world"
     )
-    return [
-        Estimate(
-            "share of beams without return",
-            share,
-            max(0.0, share - 2 * std),
-            share + 2 * std,
-            "",
-            why,
-        )
-    ]
+    return [_share("share of beams without return", missing / count, count, why)]
+
+
+def _share(name: str, share: float, count: int, why: str) -> Estimate:
+    std = np.sqrt(max(share * (1 - share), 1 / count) / count)
+    return Estimate(name, share, max(0.0, share - 2 * std), share + 2 * std, "", why)
 
 
 def _step_of(recording: Recording) -> float | None:
