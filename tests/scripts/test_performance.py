@@ -53,7 +53,7 @@ def test_each_table_is_written_to_its_place_and_nothing_else_changes(tmp_path):
     performance.write(ROWS, tmp_path)
     performance.write(ROWS, tmp_path)  # its places are still there
     text = (tmp_path / performance.PAGE).read_text()
-    assert "| 1 000 | 4 | 0.48 | 193 MB |\n\nMeasured of THIS.\n<!-- end -->" in text
+    assert "| 1 000 | 4 | 0.48 | 193 MB |\n\nMeasured with THIS.\n<!-- end -->" in text
     assert "| 1 | MuJoCo 4.0.0 | 367 | 9.26 | 6 |" in text
     assert "| 1 | Ruedo | 33 700 |" in (tmp_path / "docs/environments.md").read_text()
     readme = (tmp_path / "README.md").read_text()
