@@ -66,8 +66,8 @@ def integrated(
     seed: int, delay: float, rise: float, fall: float, lag: float, *, seconds=40.0, rate=50.0,
     dead=0.0, limit=np.inf, only=0.0,
 ) -> Recording:  # fmt: skip
-    """A drive on a plane by commands at chance times, integrated in steps of _STEP_S. only: the size
-    of all commands.
+    """A drive on a plane by commands at chance times, integrated in steps of _STEP_S. only: the
+    size of all commands.
     """
     draw = np.random.default_rng(seed)
     when = np.cumsum(np.concatenate([[0.5], draw.uniform(0.4, 2.0, 2 * int(seconds))]))

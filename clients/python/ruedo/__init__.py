@@ -147,6 +147,7 @@ _NAMES = {
     "values": "Sample",
     "world": "World",
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 _GENERATED = ("vocabulary", "samples")  # modules that have their names in __all__
 _MODULES = ("lcmtypes", "markers", *_GENERATED, *_NAMES)
 _COMPILED = ("Engine", "SavedWorld")
@@ -161,7 +162,7 @@ class _Names(list[str]):
 
 
 def _listed() -> list[str]:
-    names = {"lcmtypes", "markers", *" ".join(_NAMES.values()).split()}
+    names = {"lcmtypes", "markers", *_HOMES}
     for module in _GENERATED:
         names.update(import_module(f".{module}", __name__).__all__)
     if find_spec("ruedo._engine"):
@@ -176,9 +177,8 @@ def __dir__() -> list[str]:
 
 def _home(name: str) -> str:
     """The module that has the name; "": none."""
-    for module, names in _NAMES.items():
-        if name in names.split():
-            return module
+    if name in _HOMES:
+        return _HOMES[name]
     for module in _GENERATED:
         if name in import_module(f".{module}", __name__).__all__:
             return module
@@ -200,7 +200,8 @@ def _late(name: str) -> object:
     if name == "__all__":
         return _Names(_listed())
     no_such_name = AttributeError(f"module 'ruedo' has no attribute {name!r}")
-    if name.startswith("_") or (name not in _MODULES and find_spec(f"ruedo.{name}")):
+    listed = name in _MODULES or name in _HOMES
+    if name.startswith("_") or (not listed and find_spec(f"ruedo.{name}")):
         raise no_such_name  # of a module `from . import name` asks first, and imports it then
     if name != "lcmtypes" and find_spec("numpy") is None:
         raise ImportError(f"ruedo.{name} needs NumPy, without which there is ruedo.lcmtypes alone")
