@@ -27,7 +27,7 @@ class Run:
 
 
 def version_of(program: str, arguments: list[str], pattern: str) -> str:
-    """The group of the pattern in what the program prints. Raises ValueError where it is not in it."""
+    """The group of the pattern in what the program prints. Raises ValueError where it has none."""
     command = [program, *arguments]
     asked = f"`{' '.join(command)}`"
     try:
