@@ -10,6 +10,10 @@ import pytest
 from conftest import ruedo
 from drives import drive
 from ruedo.engine import Engine
+from ruedo.fit import Recording
+from ruedo.fit.align import find_path
+from ruedo.fit.drives import integrate
+from ruedo.fit.recording import Path, Scans, body_steps, composed
 from ruedo.maps import FREE, OCCUPIED, load_map
 from test_readers import flaser
 
@@ -82,6 +86,31 @@ def test_drive_of_ruedo(tmp_path):
             spawn = [f"p3at@{x},{y},{2 * math.atan2(z, w)}"]
     near = np.abs(ranges[0] - ranges[1])[np.isfinite(ranges[0])]
     assert np.median(near) < 0.03
+
+
+def test_a_drive_without_a_path_is_aligned(tmp_path):
+    """Exact scans of a room with a corner of its own; the odometry turns 4 % too much, and is off
+    by more than 0.5 m and 0.4 rad in the end.
+    """
+    time = np.arange(0, 60, 0.25)
+    true = np.stack([1.5 * np.sin(time / 6), 0.8 * np.sin(time / 4), time / 6], axis=1)
+    mount = np.array([0.2, 0.1, 0.3])
+    block = (-1.0, 1.8, 0.4)
+    ranges = np.array([room_scan(one, block) for one in composed(true, np.tile(mount, (240, 1)))])
+    believed = integrate(body_steps(true) * [1, 1, 1.04], true[0])
+    drift = believed[-1] - true[-1]
+    assert np.hypot(*drift[:2]) > 0.3 and drift[2] > 0.35
+    scans = Scans(time, ranges, -math.pi / 2, math.pi / 180, np.inf)
+    log = Recording(tmp_path / "a", "made", odometry=Path(time, believed, "drifts"), scans=scans)
+    find_path(log, mount)
+    apart = log.truth.pose - true
+    assert np.hypot(*apart[:, :2].T).max() < 0.05
+    assert np.abs(apart[:, 2]).max() < 0.02
+    assert "loops are not closed" in log.findings[0]
+    scans.ranges = np.full_like(ranges, np.nan)  # nothing to align: the odometry stays
+    blind = Recording(tmp_path / "b", "made", odometry=log.odometry, scans=scans)
+    find_path(blind, mount)
+    assert blind.truth.pose == pytest.approx(believed)
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,7 @@ def test_carmen_without_times(tmp_path):
     one = read(log)
     assert one.truth.time == pytest.approx([0, 2, 4, 6])  # 1 m at 0.5 m/s
     assert "do not increase" in one.findings[0]
+    assert not one.timed and not one.streams  # no rate, no jitter, no spectrum of made times
 
 
 def test_encoder_table(tmp_path):

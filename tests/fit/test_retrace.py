@@ -181,6 +181,16 @@ def test_spectrum_of_a_sine():
     assert hertz[np.argmax(power)] == pytest.approx(1.0, abs=0.02)
 
 
+def test_made_times_have_no_spectrum():
+    time = np.arange(0, 40, 0.1)
+    pose = np.stack([time, 0 * time, 0 * time], axis=1)
+    one, other = recording(time, pose, pose), recording(time, pose, pose, "b")
+    assert compare(one, other).spectra
+    other.timed = False
+    assert not compare(one, other).spectra
+    assert any("no spectra" in remark for remark in compare(one, other).remarks)
+
+
 def test_missing_data_is_reported(folder, tmp_path):
     table = tmp_path / "path.csv"
     table.write_text("time,x,y,theta\n" + "".join(f"{t},{t / 9},0,0\n" for t in range(99)))

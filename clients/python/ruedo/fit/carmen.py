@@ -20,6 +20,10 @@ from .recording import Path, Recording, Scans, sorted_rows
 
 LINES = ("FLASER", "ROBOTLASER1", "ODOM", "PARAM", "RLASER", "TRUEPOS", "SYNC", "NEFF", "#")
 _MOST_RAYS = 10_000
+_MADE = (
+    "the log's times do not increase: they were made from the path, at 0.5 m/s; nothing that "
+    "depends on time is fitted or compared"
+)
 
 
 def read_carmen(file: File) -> Recording:
@@ -52,7 +56,9 @@ def read_carmen(file: File) -> Recording:
     step = math.pi / (rays - 1) if rays % 2 else math.pi / rays
     recording.scans = Scans(when, ranges, -math.pi / 2, step, limit, poses, "log")
     recording.truth = Path(when, poses.copy(), "the log's poses")
-    recording.streams["scans"] = when
+    recording.timed = _MADE not in recording.findings
+    if recording.timed:
+        recording.streams["scans"] = when
     return recording
 
 
@@ -132,10 +138,7 @@ def _times(stamps: list[float], poses: np.ndarray) -> tuple[np.ndarray, list[str
     gaps = np.diff(time)
     if len(time) > 1 and np.mean(gaps > 0) < 0.5:
         way = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-        return np.concatenate([[0.0], np.cumsum(np.maximum(0.1, way / 0.5))]), [
-            "the log's times do not increase: they were made from the path, at 0.5 m/s; "
-            "nothing that depends on time is fitted"
-        ]
+        return np.concatenate([[0.0], np.cumsum(np.maximum(0.1, way / 0.5))]), [_MADE]
     if np.any(gaps < 0):
         usual = float(np.median(gaps[gaps > 0]))
         bad = int(np.sum(gaps < 0))

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..engine import Engine
 from ..launching import find_ruedo
+from .align import find_path
 from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal
@@ -126,6 +127,7 @@ def fit(
     """
     answer = Fit(list(recordings))
     for one in recordings:
+        find_path(one, mount_on(one, robot) if mount is None else np.asarray(mount, float))
         answer.remarks += [f"{one.file}: {finding}" for finding in one.findings]
     stages: list[Callable[[], None]] = [
         lambda: _fit_drive(answer, robot),

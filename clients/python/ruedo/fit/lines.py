@@ -24,6 +24,7 @@ _BESIDE_M = 0.1  # of a line, where a flat surface has nothing else
 _MOST_OTHERS = 0.02  # of the points there
 _ROUGH, _FINE = 6.0, 4.0  # sigma, from a line to its points
 _CHANCE = 4.0  # sigma that the points of a flat surface may scatter more than their noise says
+_BENT = 2.0  # sigma of a quadratic term of the line, from which on the surface is round
 _AT_ONCE = 500  # readings, each with hundreds of points around it
 
 
@@ -90,7 +91,7 @@ class _Lines:
 class _Weighted(_Lines):
     """Of pairs: weight (1/m^2) and place along the line (m). Of readings: sum of the weights, mean
     place and second moment, where the beam meets the line (m from the mean), how many points, their
-    chi^2 by degrees of freedom, and how many are near the line or beside it.
+    chi^2 by degrees of freedom, a quadratic term by its sigma, and how many are near or beside it.
     """
 
     weight: Array
@@ -101,6 +102,7 @@ class _Weighted(_Lines):
     meets: Array
     count: Array
     chi2: Array
+    bend: Array
     beside: Array
 
 
@@ -160,10 +162,14 @@ class _Pairs:
             more = (off - slope * middle) / (across - slope * along)
             count = self.sums(near.astype(float))
             chi2 = (left - slope * mixed) / (count - 2)
+            u = t - middle[row]
+            third, fourth = self.sums(weight * u**3), self.sums(weight * u**4)
+            bent = self.sums(weight * d * u * u) - second * off - third * mixed / second
+            bend = bent / np.sqrt(fourth - second**2 / total - third**2 / second)
         beside = self.sums((inside & (apart <= _BESIDE_M + gate * spread)).astype(float))
         return _Weighted(
             lines.ahead + more, lines.angle + np.arctan(slope), weight, t, total, middle, second,
-            more * along - middle, count, chi2, beside,
+            more * along - middle, count, chi2, bend, beside,
         )  # fmt: skip
 
     def judged(self, lines: _Weighted, reading: NDArray[np.int64]) -> Against:
@@ -175,6 +181,7 @@ class _Pairs:
         with np.errstate(divide="ignore", invalid="ignore"):
             good = (lines.count >= LEAST_POINTS) & (incidence <= STEEPEST)
             good &= lines.chi2 <= 1 + _CHANCE * np.sqrt(2 / (lines.count - 2))
+            good &= np.abs(lines.bend) <= _BENT
             good &= lines.second / lines.total >= (HALF_M / 4) ** 2
             good &= lines.beside <= lines.count * (1 + _MOST_OTHERS)
             line = np.sqrt(1 / lines.total + lines.meets**2 / lines.second) / np.abs(facing)

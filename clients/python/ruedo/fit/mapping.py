@@ -21,7 +21,7 @@ _WALL = 0.25  # least share of the scans at a cell that end there
 _LEAST_HITS = 2
 _MOVED_HITS, _MOVED_CELLS = 3, 4
 _MOST_CELLS = 100_000_000
-_NO_PATH = "the log has no corrected path: walls follow the robot's own odometry, which drifts"
+NO_PATH = "the log has no corrected path: walls follow the robot's own odometry, which drifts"
 FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # grey, as map_server has it
 
 
@@ -76,8 +76,8 @@ def scan_poses(recording: Recording, mount: Array, later: float = 0.0) -> Array:
         if path is None:
             recording.need("odometry", "a path is needed (SLAM, /tf map->odom, ROBOT/pose)")
             path = recording.odometry
-            if _NO_PATH not in recording.findings:
-                recording.findings.append(_NO_PATH)
+            if NO_PATH not in recording.findings:
+                recording.findings.append(NO_PATH)
         assert path is not None
         robot = path.at(scans.time + later)
         outside = (scans.time < path.time[0]) | (scans.time > path.time[-1])

@@ -110,6 +110,7 @@ class Recording:
     imu: Imu | None = None
     geometry: Geometry | None = None
     streams: dict[str, Array] = field(default_factory=dict)  # times of each stream, s
+    timed: bool = True  # whether times are those of the log
     findings: list[str] = field(default_factory=list)
 
     def need(self, what: str, why: str) -> None:
@@ -154,6 +155,13 @@ def composed(first: Array, then: Array) -> Array:
         ],
         axis=1,
     )
+
+
+def inverse(pose: Array) -> Array:
+    """(N, 3): poses of the world as seen from poses (N, 3)."""
+    sine, cosine = np.sin(pose[:, 2]), np.cos(pose[:, 2])
+    x, y, heading = pose.T
+    return np.stack([-cosine * x - sine * y, sine * x - cosine * y, -heading], axis=1)
 
 
 def wrapped(angle: Array) -> Array:

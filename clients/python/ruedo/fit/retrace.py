@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..launching import launch
+from .align import find_path
 from .errors import FitError
-from .fitting import Robot, mount_of, rangefinder_of
+from .fitting import Robot, mount_of, mount_on, rangefinder_of
 from .progress import track
 from .recording import Path, Recording, body_steps, wrapped
 
@@ -104,6 +105,7 @@ def robot_path(recording: Recording, robot: Robot) -> Path:
         place = scans.pose[:, :2] - np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
         path = Path(scans.time, np.column_stack([place, heading]), "SLAM")
     else:
+        find_path(recording, mount_on(recording, robot))
         recording.need("truth", "a path is needed (SLAM, motion capture, /tf map->odom, pose)")
         assert recording.truth is not None
         path = recording.truth

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.signal import welch
 from scipy.stats import energy_distance, ks_2samp
 
+from .align import find_path
 from .drives import Drive, integrate
 from .errors import FitError
 from .fitting import Robot, mount_on
@@ -148,6 +149,7 @@ def compare(first: Recording, second: Recording, robot: Robot | None = None) -> 
     both = (first, second)
     answer = Statistics((str(first.file), str(second.file)))
     for one in both:
+        find_path(one, mount_on(one, robot))
         answer.remarks += [f"{one.file}: {finding}" for finding in one.findings]
     for part in (_compare_ranges, _compare_drift, _compare_spectra):
         try:
@@ -271,7 +273,9 @@ def _compare_drift(
 
 def _signals(recording: Recording, source: str) -> dict[str, tuple[Array, Array, str]]:
     """Times (s), values and unit. source: "odometry" or "path", of the speeds."""
-    answer = {}
+    answer: dict[str, tuple[Array, Array, str]] = {}
+    if not recording.timed:
+        return answer
     path = reckoned(recording) if source == "odometry" else recording.truth
     if path is not None and len(path.time) > 2:
         middle = (path.time[1:] + path.time[:-1]) / 2

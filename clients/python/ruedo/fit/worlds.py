@@ -10,6 +10,7 @@ from pathlib import Path as File
 import numpy as np
 
 from ..launching import find_ruedo
+from .align import find_path
 from .errors import FitError, UsageError
 from .mapping import Moving, Occupancy, occupancy
 from .recording import Recording
@@ -31,6 +32,7 @@ def make_world(
         raise UsageError(f"{out}: -o takes a name that ends with .sdf; the map gets the same name")
     if not out.absolute().parent.is_dir():
         raise UsageError(f"{out}: its folder does not exist")
+    find_path(recording, np.asarray(mount, float))
     found = occupancy(recording, np.asarray(mount, float), resolution)
     file = out.with_suffix(".yaml")
     write_map(found, file)
