@@ -10,9 +10,10 @@ import pytest
 from conftest import ruedo
 from drives import drive
 from ruedo.engine import Engine
-from ruedo.fit import Recording
+from ruedo.fit import FitError, Recording
 from ruedo.fit.align import find_path
 from ruedo.fit.drives import integrate
+from ruedo.fit.mapping import occupancy
 from ruedo.fit.recording import Path, Scans, body_steps, composed
 from ruedo.maps import FREE, OCCUPIED, load_map
 from test_readers import flaser
@@ -86,6 +87,20 @@ def test_drive_of_ruedo(tmp_path):
             spawn = [f"p3at@{x},{y},{2 * math.atan2(z, w)}"]
     near = np.abs(ranges[0] - ranges[1])[np.isfinite(ranges[0])]
     assert np.median(near) < 0.03
+
+
+def test_other_units_and_another_clock(tmp_path):
+    time, pose = np.arange(5.0), np.stack([np.arange(5.0), np.zeros(5), np.zeros(5)], axis=1)
+    path, bearings = Path(time, pose, "made"), (-math.pi / 2, math.pi / 180, np.inf)
+    ranges = np.array([room_scan((0, 0, 0))] * 5)
+    millimetres = Recording("a", "made", truth=path, scans=Scans(time, ranges * 1000, *bearings))
+    with pytest.raises(FitError, match="ranges and poses may be in other units than m"):
+        occupancy(millimetres, np.zeros(3))
+    late = Recording("a", "made", truth=path, scans=Scans(time + 1e6, ranges, *bearings))
+    with pytest.raises(
+        FitError, match="no scan lies within the path's times .* clocks or the units"
+    ):
+        occupancy(late, np.zeros(3))
 
 
 def test_a_drive_without_a_path_is_aligned(tmp_path):

@@ -265,6 +265,11 @@ def test_bag_with_frames_of_its_own(tmp_path):
             "a reading of its wheels every 50 s; allowed are times in s",
         ),
         (
+            "a.csv",
+            "time,x,y,theta\n" + "".join(f"{0.1 * k:.1f},{30 * k},0,0\n" for k in range(9)),
+            "its path moves at 300 m/s; allowed are m and s",
+        ),
+        (
             "7_run-01.csv",
             "0,0,0,0,0,0\n0,0,0,0,36,18\n",
             "7_run-01.csv:2: time 0 s does not increase",

@@ -13,7 +13,7 @@ from .bags import read_bag
 from .carmen import LINES, read_carmen
 from .errors import FitError
 from .lcm_log import read_lcm
-from .recording import Array, Recording
+from .recording import Array, Path, Recording
 from .tables import cells_of, read_csv, read_encoder_table
 
 KINDS = (
@@ -21,6 +21,7 @@ KINDS = (
     "CSV with a header"
 )
 _MOST_GAP_S = 5.0  # between readings of wheels
+_FASTEST_M_S = 100.0  # of a drive
 
 
 def read(path: str | File, robot: str = "") -> Recording:
@@ -30,10 +31,24 @@ def read(path: str | File, robot: str = "") -> Recording:
     Raises FitError for a file that is not a log or is damaged, OSError for what cannot be opened.
     """
     recording = _read(File(path), robot)
+    for name in ("truth", "odometry"):
+        if (stream := getattr(recording, name)) is not None:
+            _check_speed(recording.file, "path" if name == "truth" else name, stream)
     for name in ("odometry", "wheels", "imu"):
         if (stream := getattr(recording, name)) is not None:
             _check_times(recording.file, name, stream.time)
     return recording
+
+
+def _check_speed(file: File, name: str, path: Path) -> None:
+    """Raises FitError where a path is faster than anything that drives."""
+    speed = np.hypot(*np.diff(path.pose[:, :2], axis=0).T) / np.diff(path.time)
+    usual = float(np.median(speed[speed > 0])) if np.sum(speed > 0) > 2 else 0.0
+    if usual > _FASTEST_M_S:
+        raise FitError(
+            f"{file}: its {name} moves at {usual:.3g} m/s; allowed are m and s: these may be in "
+            "another unit"
+        )
 
 
 def _check_times(file: File, name: str, time: Array) -> None:
