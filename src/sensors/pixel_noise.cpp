@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/wide.h"
 #include "base/whole.h"
 
 namespace ruedo {
@@ -26,6 +27,29 @@ uint64_t split_mix(uint64_t x) {
   return x ^ (x >> 31);
 }
 
+constexpr size_t kPerDraw = 4;  // 16 bits each
+constexpr size_t kTogether = 64 * kPerDraw;
+
+// At most kTogether pixels. Adding 256 (in base) makes the truncation to an integer round down
+// below zero, too.
+RUEDO_WIDE void add_noise(uint64_t key, uint64_t counter, const float* table, float base,
+                          float scale, size_t count, uint8_t* __restrict pixels) {
+  const size_t draws = (count + kPerDraw - 1) / kPerDraw;
+  uint64_t bits[kTogether / kPerDraw];
+  for (size_t i = 0; i < draws; ++i) bits[i] = split_mix(key + (counter + i) * 0x9e3779b97f4a7c15u);
+  int32_t quantiles[kTogether];
+  for (size_t i = 0; i < draws; ++i) {
+    for (size_t k = 0; k < kPerDraw; ++k)
+      quantiles[kPerDraw * i + k] = static_cast<int32_t>(bits[i] >> (16 * k) & 0xffff);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const float value = static_cast<float>(pixels[i]) + base + scale * table[quantiles[i]];
+    const float not_low = value < 256.0f ? 256.0f : value;
+    const float kept = not_low > 511.0f ? 511.0f : not_low;
+    pixels[i] = static_cast<uint8_t>(static_cast<int>(kept) - 256);
+  }
+}
+
 }  // namespace
 
 PixelNoise::PixelNoise(double mean, double stddev)
@@ -37,16 +61,9 @@ void PixelNoise::apply(RandomStream stream, std::span<uint8_t> pixels) const {
   if (none()) return;
   const float* table = normal_table().data();
   const uint64_t key = (uint64_t{stream.bits()} << 32) | stream.bits();
-  // Adding 256 makes the truncation to an integer round down below zero, too.
-  const float base = mean_ + 256.5f;
-  for (size_t i = 0, counter = 1; i < pixels.size(); i += 4, ++counter) {
-    uint64_t bits = split_mix(key + counter * 0x9e3779b97f4a7c15u);
-    const size_t end = std::min(i + 4, pixels.size());
-    for (size_t k = i; k < end; ++k, bits >>= 16) {
-      const float value = static_cast<float>(pixels[k]) + base + scale_ * table[bits & 0xffff];
-      pixels[k] = static_cast<uint8_t>(static_cast<int>(std::clamp(value, 256.0f, 511.0f)) - 256);
-    }
-  }
+  for (size_t i = 0; i < pixels.size(); i += kTogether)
+    add_noise(key, 1 + i / kPerDraw, table, mean_ + 256.5f, scale_,
+              std::min(kTogether, pixels.size() - i), &pixels[i]);
 }
 
 Vignette::Vignette(double lost, int width, int height) {
