@@ -83,8 +83,10 @@ TEST(ReducedMatrix, SolvesLikeADenseFactor) {
   ASSERT_EQ(reduced.size(), kBodies - 1u);
   ASSERT_EQ(reduced.ways(), 22u);
 
+  // The blocks are of twists.
+  const Eigen::MatrixXd T = twists.bottomRows(6 * kBodies - 6);
   const std::vector<std::pair<int, int>> pairs = {{1, 3}, {3, 5}, {5, 7}, {7, 9}, {8, 7}, {2, 4}};
-  Eigen::MatrixXd dense = Eigen::MatrixXd::Identity(S.rows(), S.rows());
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(S.rows(), S.rows());
   reduced.set_identity();
   for (const auto& [a, b] : pairs) {
     const int p = reduced.place(a), q = reduced.place(b);
@@ -98,16 +100,37 @@ TEST(ReducedMatrix, SolvesLikeADenseFactor) {
     both.middleRows<6>(6 * q) = B;
     dense += both * both.transpose();
   }
+  const size_t bent = reduced.way_between(reduced.place(3), reduced.place(2));
+  ASSERT_EQ(bent, 7u);  // way 0 to 5: of body 1, 6: of body 2
+  EXPECT_EQ(reduced.way_between(reduced.place(1), reduced.place(4)), ReducedMatrix::kNone);
+  EXPECT_EQ(reduced.way_between(reduced.place(3), reduced.place(1)), ReducedMatrix::kNone);
+  reduced.stiffen(bent, 5.0);
   reduced.factor();
   for (const bool all : {true, false}) {  // with the blocks, and without
     Eigen::VectorXd right(S.rows());
     std::vector<Six> x(kBodies - 1);
     for (int i = 0; i < kBodies - 1; ++i) x[i] = right.segment<6>(6 * i) = Six::NullaryExpr(number);
     all ? reduced.solve(x) : reduced.project(x);
-    const Eigen::MatrixXd H = all ? Eigen::MatrixXd(S.transpose() * dense * S) : S.transpose() * S;
+    Eigen::MatrixXd H = S.transpose() * S;
+    if (all) {
+      H += T.transpose() * dense * T;
+      H(7, 7) += 5.0;
+    }
     const Eigen::VectorXd expected = S * H.llt().solve(S.transpose() * right);
     for (int i = 0; i < kBodies - 1; ++i)
       EXPECT_LT((x[i] - expected.segment<6>(6 * i)).norm(), 1e-9 * expected.norm()) << i;
+  }
+
+  // Of rows on one body, between neighbours, and between two trees.
+  const Eigen::MatrixXd yields = S * (S.transpose() * S).llt().solve(S.transpose());
+  for (const auto& [a, b] : std::vector<std::pair<int, int>>{{3, 0}, {2, 3}, {5, 4}, {3, 8}}) {
+    const PlaceIndex p = reduced.place(a), q = b > 0 ? reduced.place(b) : PlaceIndex();
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(S.rows());
+    const Six J_a = Six::NullaryExpr(number), J_b = Six::NullaryExpr(number);
+    row.segment<6>(6 * p) = J_a;
+    if (q.valid()) row.segment<6>(6 * q) = J_b;
+    const double expected = row.dot(yields * row);
+    EXPECT_NEAR(reduced.response(p, J_a, q, J_b), expected, 1e-9 * expected) << a << " " << b;
   }
 }
 
@@ -189,6 +212,79 @@ TEST(Newton, ATowerOfAnyMassesStops) {
     EXPECT_LT(std::abs(tower.body(i + 1).v.z()), 1e-6);
     EXPECT_NEAR(tower.row(3 * i).impulse, 0.05 * above, 1e-6 * above);
   }
+}
+
+// Light blocks on rails of a heavy body, across which each of them hits a wall: all stop, and the
+// walls bear the momentum of all. A block yields a tiny part of what it would by itself.
+TEST(Newton, WallsThatLightPartsHitStopAHeavyBody) {
+  constexpr int kBlocks = 40;
+  constexpr double kHeavy = 1000.0, kLight = 0.05, kSpeed = 2.0;
+  SolverBodies bodies(2 + kBlocks);
+  for (size_t i = 1; i < bodies.size(); ++i) {
+    bodies[i].inverse_mass = Vec3::Constant(1.0 / (i == 1 ? kHeavy : kLight));
+    bodies[i].v = Vec3(kSpeed, 0.0, 0.0);
+  }
+  Newton newton;
+  newton.begin_trees(bodies);
+  const auto along = [](int axis) {
+    Eigen::Matrix<double, 6, 1> way = Eigen::Matrix<double, 6, 1>::Zero();
+    way[3 + axis] = 1.0;
+    return way;
+  };
+  newton.add_body(1, 0, Vec3::Zero());
+  for (int axis = 0; axis < 3; ++axis) newton.add_way(along(axis));
+  std::vector<Row> rows;
+  for (int body = 2; body < 2 + kBlocks; ++body) {
+    newton.add_body(body, 1, Vec3::Zero());
+    newton.add_way(along(2));
+    for (int k = 0; k < 3; ++k) {
+      Row row;
+      row.a = body;
+      row.linear_a = k == 0 ? Vec3(-1.0, 0.0, 0.0) : Vec3(Vec3::Unit(k));
+      if (k == 0) row.upper = 1e30;
+      row.prepare(bodies);
+      rows.push_back(row);
+    }
+  }
+  newton.end_trees();
+  newton.begin();
+  for (size_t i = 0; i < rows.size(); i += 3)
+    newton.add(rows[i], rows[i + 1], rows[i + 2], 0.5, 0.5);
+  EXPECT_TRUE(newton.solve(bodies, 1e-6, 8));
+  double borne = 0.0;
+  for (size_t i = 0; i < rows.size(); i += 3) borne += rows[i].impulse;
+  EXPECT_NEAR(borne, (kHeavy + kBlocks * kLight) * kSpeed, 1e-2);
+}
+
+// A contact near the middle of a falling rod turns it, and its far end, which was to stay clear of
+// the ground, comes down on that, too.
+TEST(Newton, AContactThatTurnsABodyBringsOthersAbout) {
+  SolverBodies bodies(2);
+  bodies[1].inverse_mass = Vec3::Ones();
+  bodies[1].inverse_inertia = 100.0 * Eigen::Matrix3d::Identity();
+  bodies[1].v = Vec3(0.0, 0.0, -2.0);
+  Row rows[2][3];
+  const double at[2] = {0.1, -1.0}, target[2] = {0.0, -5.0};
+  for (int i = 0; i < 2; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      Row& row = rows[i][k];
+      row.a = 1;
+      row.linear_a = Vec3::Unit((k + 2) % 3);
+      row.angular_a = Vec3(at[i], 0.0, 0.0).cross(row.linear_a);
+      row.target = k == 0 ? target[i] : 0.0;
+      if (k == 0) row.upper = 1e30;
+      row.prepare(bodies);
+    }
+  }
+  Newton newton;
+  newton.prepare(bodies, {{1, 0}});
+  newton.begin();
+  for (auto& [normal, along, across] : rows) newton.add(normal, along, across, 0.0, 0.0);
+  EXPECT_TRUE(newton.solve(bodies, 1e-9, 50));
+  // Both ends reach their targets: 1.1 m times the rate is 5 m/s.
+  EXPECT_NEAR(bodies[1].w.y(), -5.0 / 1.1, 1e-6);
+  EXPECT_NEAR(bodies[1].v.z(), -0.5 / 1.1, 1e-6);
+  EXPECT_NEAR(rows[0][0].impulse + rows[1][0].impulse, 2.0 - 0.5 / 1.1, 1e-6);
 }
 
 TEST(Newton, SeparatingBodiesGetNoImpulse) {

@@ -58,6 +58,8 @@ Newton::Newton() {
   step_.reserve(kBodies);
   bounds_.reserve(kRows);
   contacts_.reserve(kRows);
+  near_.reserve(kRows);
+  far_.reserve(kRows);
 }
 
 void Newton::set_bodies(const SolverBodies& bodies) {
@@ -140,6 +142,15 @@ Newton::Six Newton::scaled(int body, const Vec3& linear, const Vec3& angular) co
   return J;
 }
 
+// In trees of joints, with all that hangs on the two bodies; of bodies that joints hold still,
+// small.
+double Newton::response_of(const Row& row, const Six& J_a, const Six& J_b) const {
+  constexpr double kLeast = 1e-6;
+  if (matrix_ != &reduced_) return row.response;
+  const double reduced = reduced_.response(reduced_.place(row.a), J_a, reduced_.place(row.b), J_b);
+  return std::max(reduced, kLeast * row.response);
+}
+
 void Newton::add(Row& row) {
   Bound& bound = bounds_.emplace_back();
   bound.row = &row;
@@ -149,6 +160,13 @@ void Newton::add(Row& row) {
   bound.upper = row.upper;
   bound.J_a = scaled(row.a, row.linear_a, row.angular_a);
   bound.J_b = scaled(row.b, row.linear_b, row.angular_b);
+  bound.response = response_of(row, bound.J_a, bound.J_b);
+  bound.way = kNone;
+  if (matrix_ != &reduced_) return;
+  bound.way = reduced_.way_between(bound.a, bound.b);
+  if (bound.way == kNone) return;
+  const bool of_a = reduced_.moves(bound.way, bound.a);
+  bound.along = reduced_.along(bound.way, of_a ? bound.a : bound.b, of_a ? bound.J_a : bound.J_b);
 }
 
 void Newton::add(Row& row, size_t contact, double lever) {
@@ -173,12 +191,15 @@ size_t Newton::add(Row& normal, Row& along, Row& across, double friction, double
     contact.rows[k] = &row;
     contact.softness[k] = scales[k] * scales[k] * row.softness;
     contact.begun[k] = contact.held[k] = row.impulse / scales[k];
-    contact.J_a.row(k) = scales[k] * scaled(row.a, row.linear_a, row.angular_a);
-    contact.J_b.row(k) = scales[k] * scaled(row.b, row.linear_b, row.angular_b);
-  }
-  if (rubs) {
-    contact.response_t =
-        std::max(friction * friction * along.response, friction2 * friction2 * across.response);
+    const Six J_a = scaled(row.a, row.linear_a, row.angular_a),
+              J_b = scaled(row.b, row.linear_b, row.angular_b);
+    contact.J_a.row(k) = scales[k] * J_a;
+    contact.J_b.row(k) = scales[k] * J_b;
+    const double response = scales[k] * scales[k] * response_of(row, J_a, J_b);
+    if (k == 0)
+      contact.response = response;
+    else
+      contact.response_t = std::max(contact.response_t, response);
   }
   return contacts_.size() - 1;
 }
@@ -201,16 +222,44 @@ void Newton::start(const SolverBodies& bodies) {
   }
   y_.assign(matrix_->size(), Six::Zero());
   step_ = y_;
+  leave_out_far();
   set_weights(kYieldsFirst);
   set_bounds();
 }
 
+// Contacts that would open by more than others lack, and bear nothing, hardly matter: they cost
+// time only where they turn out to.
+void Newton::leave_out_far() {
+  double most = 0.0;
+  for (const Contact& contact : contacts_) most = std::max(most, contact.missing[0]);
+  near_.clear();
+  far_.clear();
+  for (Contact& contact : contacts_) {
+    const bool far = contact.held == Vec3::Zero() && contact.missing[0] < -most;
+    (far ? far_ : near_).push_back(&contact);
+  }
+}
+
+// Adds those that would close at the present velocities.
+bool Newton::look_at_far() {
+  const size_t before = near_.size();
+  std::erase_if(far_, [this](Contact* contact) {
+    contact->moves.setZero();
+    if (contact->a.valid()) contact->moves.noalias() += contact->J_a * y_[contact->a];
+    if (contact->b.valid()) contact->moves.noalias() += contact->J_b * y_[contact->b];
+    if (contact->missing[0] <= contact->moves[0]) return false;
+    near_.push_back(contact);
+    pull(*contact, 0.0);
+    return true;
+  });
+  return near_.size() > before;
+}
+
 void Newton::set_weights(double yields) {
   yields_ = yields;
-  for (Bound& bound : bounds_)
-    bound.weight = 1.0 / (bound.row->softness + yields * bound.row->response);
+  for (Bound& bound : bounds_) bound.weight = 1.0 / (bound.row->softness + yields * bound.response);
   for (Contact& contact : contacts_) {
-    contact.weight = 1.0 / (contact.softness[0] + yields * contact.rows[0]->response);
+    contact.weight = 1.0 / (contact.softness[0] + yields * contact.response);
     const double softness_t = std::max(contact.softness[1], contact.softness[2]);
     if (contact.rows[1]) contact.weight_t = 1.0 / (softness_t + yields * contact.response_t);
   }
@@ -278,7 +327,8 @@ void Newton::pull_in_zones() {
     const double wanted = Newton::wanted(bound, 0.0);
     bound.pulls = bound.active ? wanted : std::clamp(wanted, bound.lower, bound.upper);
   }
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     const Vec3 wanted = Newton::wanted(contact, 0.0);
     if (contact.zone == Zone::open) {
       contact.pulls = Vec3::Zero();
@@ -292,6 +342,7 @@ void Newton::pull_in_zones() {
       contact.stiffness = contact.weight / (1.0 + ratio);
     }
   }
+  in_zones_ = true;
   find_gradient();
 }
 
@@ -305,35 +356,43 @@ Vec3 Newton::stiffness_times(const Contact& contact, const Vec3& u) const {
               contact.sine * radial + contact.cosine * across);
 }
 
-// The derivative of the convex function along the step, that part of it on; also the impulses and
-// the second derivative there.
+// The derivative of the convex function along the step, that part of it on; also the impulses
+// there.
 double Newton::slope(double part) {
+  pulled_at_ = part;
   double sum = slope_of_step_ + part * square_of_step_;
-  curvature_ = square_of_step_;
   for (Bound& bound : bounds_) {
     pull(bound, part);
     sum -= (bound.pulls - bound.begun) * bound.turns;
-    if (bound.active) curvature_ += bound.weight * bound.turns * bound.turns;
   }
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     pull(contact, part);
     sum -= (contact.pulls - contact.begun).dot(contact.turns);
-    curvature_ += contact.turns.dot(stiffness_times(contact, contact.turns));
   }
+  return sum;
+}
+
+// The second derivative along the step, where slope() was last.
+double Newton::curvature() const {
+  double sum = square_of_step_;
+  for (const Bound& bound : bounds_)
+    if (bound.active) sum += bound.weight * bound.turns * bound.turns;
+  for (const Contact* of : near_) sum += of->turns.dot(stiffness_times(*of, of->turns));
   return sum;
 }
 
 // How far to go along the step: to where the function is least, found by Newton's method in a
 // bracket. 0: the step, which assumed that zones last, leads up.
 double Newton::search() {
-  const double begin = slope(0.0);
+  const double begin = in_zones_ ? slope(0.0) : first_slope_;
   double part = 1.0, low = 0.0, high = 1.0;
   for (int k = 0; k < kMostTrials; ++k) {
     const double here = slope(part);
     if (std::abs(here) <= kSlopeLeft * std::abs(begin) || (here < 0.0 && part >= 1.0)) break;
     if (begin >= 0.0) return 0.0;
     (here > 0.0 ? high : low) = part;
-    part -= here / curvature_;
+    part -= here / curvature();
     if (!(part > low && part < high)) part = 0.5 * (low + high);
   }
   return part;
@@ -346,7 +405,8 @@ void Newton::find_gradient() {
     if (bound.a.valid()) gradient_[bound.a] -= more * bound.J_a;
     if (bound.b.valid()) gradient_[bound.b] -= more * bound.J_b;
   }
-  for (const Contact& contact : contacts_) {
+  for (const Contact* of : near_) {
+    const Contact& contact = *of;
     const Vec3 more = contact.pulls - contact.begun;
     if (contact.a.valid()) gradient_[contact.a].noalias() -= contact.J_a.transpose() * more;
     if (contact.b.valid()) gradient_[contact.b].noalias() -= contact.J_b.transpose() * more;
@@ -356,16 +416,24 @@ void Newton::find_gradient() {
 bool Newton::same_zones() const {
   return std::all_of(bounds_.begin(), bounds_.end(),
                      [](const Bound& bound) { return bound.active == bound.was_active; }) &&
-         std::all_of(contacts_.begin(), contacts_.end(),
-                     [](const Contact& contact) { return contact.zone == contact.was; });
+         std::all_of(near_.begin(), near_.end(),
+                     [](const Contact* contact) { return contact->zone == contact->was; });
 }
 
 bool Newton::any_slips() const {
-  return std::any_of(contacts_.begin(), contacts_.end(),
-                     [](const Contact& contact) { return contact.zone == Zone::slips; });
+  return std::any_of(near_.begin(), near_.end(),
+                     [](const Contact* contact) { return contact->zone == Zone::slips; });
 }
 
-void Newton::add_block(PlaceIndex a, PlaceIndex b, const auto& of_a, const auto& of_b) {
+// As the matrix has them: in trees of joints, in twists.
+template <class Rows>
+Rows Newton::unscaled(PlaceIndex place, const Rows& J) const {
+  if (matrix_ != &reduced_ || !place.valid()) return J;
+  return J.lazyProduct(reduced_.scale(place));
+}
+
+void Newton::add_block(PlaceIndex a, PlaceIndex b, const auto& scaled_a, const auto& scaled_b) {
+  const auto of_a = unscaled(a, scaled_a), of_b = unscaled(b, scaled_b);
   if (a.valid()) matrix_->block(a, a) += of_a.transpose().lazyProduct(of_a);
   if (b.valid()) matrix_->block(b, b) += of_b.transpose().lazyProduct(of_b);
   if (!a.valid() || !b.valid()) return;
@@ -383,10 +451,14 @@ void Newton::assemble() {
     if (!bound.active) continue;
     const double root = std::sqrt(bound.weight);
     using Line = Eigen::Matrix<double, 1, 6>;
-    add_block(bound.a, bound.b, Line(root * bound.J_a.transpose()),
-              Line(root * bound.J_b.transpose()));
+    if (bound.way != kNone)
+      reduced_.stiffen(bound.way, bound.weight * bound.along * bound.along);
+    else
+      add_block(bound.a, bound.b, Line(root * bound.J_a.transpose()),
+                Line(root * bound.J_b.transpose()));
   }
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     contact.was = contact.zone;
     if (contact.zone == Zone::open) continue;
     Eigen::Matrix3d root = Eigen::Matrix3d::Zero();
@@ -405,8 +477,9 @@ void Newton::assemble() {
 void Newton::find_step() {
   for (size_t i = 0; i < step_.size(); ++i) step_[i] = -gradient_[i];
   matrix_->solve(step_);
-  slope_of_step_ = square_of_step_ = 0.0;
+  slope_of_step_ = square_of_step_ = first_slope_ = 0.0;
   for (size_t i = 0; i < step_.size(); ++i) {
+    first_slope_ += gradient_[i].dot(step_[i]);
     slope_of_step_ += y_[i].dot(step_[i]);
     square_of_step_ += step_[i].squaredNorm();
   }
@@ -415,7 +488,8 @@ void Newton::find_step() {
     if (bound.a.valid()) bound.turns += bound.J_a.dot(step_[bound.a]);
     if (bound.b.valid()) bound.turns += bound.J_b.dot(step_[bound.b]);
   }
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     contact.turns.setZero();
     if (contact.a.valid()) contact.turns.noalias() += contact.J_a * step_[contact.a];
     if (contact.b.valid()) contact.turns.noalias() += contact.J_b * step_[contact.b];
@@ -431,10 +505,11 @@ Newton::Errors Newton::take_multipliers(bool first) {
     most.yielded = std::max(most.yielded, yields_ * std::abs(pulls - held) * response);
     held = pulls;
   };
-  for (Bound& bound : bounds_) take(bound.held, bound.pulls, bound.row->response);
+  for (Bound& bound : bounds_) take(bound.held, bound.pulls, bound.response);
   double product = 0.0, square = 0.0;
-  for (Contact& contact : contacts_) {
-    take(contact.held[0], contact.pulls[0], contact.rows[0]->response);
+  for (Contact* of : near_) {
+    Contact& contact = *of;
+    take(contact.held[0], contact.pulls[0], contact.response);
     if (!contact.rows[1]) continue;
     contact.held.tail<2>() = contact.pulls.tail<2>();
     const Vec3 missing = contact.missing - contact.moves;
@@ -449,7 +524,8 @@ Newton::Errors Newton::take_multipliers(bool first) {
   }
   const double back =
       first || square == 0.0 ? 0.0 : std::clamp(product / square, kLeastBack, kMostBack);
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     const double on = contact.slip + contact.slip_error;
     const double before = contact.last_slip + contact.last_error;
     const double next = contact.bears ? on - back * (on - before) : on;
@@ -475,7 +551,8 @@ double Newton::furthest(const std::vector<Six>& change) {
 
 void Newton::give(SolverBodies& bodies) const {
   for (const Bound& bound : bounds_) bound.row->give(bodies, bound.pulls - bound.begun);
-  for (const Contact& contact : contacts_) {
+  for (const Contact* of : near_) {
+    const Contact& contact = *of;
     const Vec3 more = contact.pulls - contact.begun;
     for (int k = 0; k < 3 && contact.rows[k]; ++k)
       contact.rows[k]->give(bodies, (k == 0 ? 1.0 : contact.friction[k - 1]) * more[k]);
@@ -488,16 +565,19 @@ void Newton::go_on(double part) {
     bound.moves += part * bound.turns;
     bound.turns = 0.0;
   }
-  for (Contact& contact : contacts_) {
+  for (Contact* of : near_) {
+    Contact& contact = *of;
     contact.moves += part * contact.turns;
     contact.turns.setZero();
   }
-  slope(0.0);
+  if (pulled_at_ != part) slope(0.0);
+  in_zones_ = false;
   find_gradient();
 }
 
 bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
   start(bodies);
+  slope(0.0);
   go_on(0.0);
   double small = tolerance;  // error that ends Newton's method for these multipliers
   Errors last = {kHuge, kHuge};
@@ -505,7 +585,8 @@ bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
   for (int i = 0; i < most_steps; ++i) {
     if (furthest(gradient_) <= small) {
       const Errors errors = take_multipliers(last.slipped == kHuge);
-      done = std::max(errors.yielded, errors.slipped) <= tolerance;
+      const bool more = look_at_far();
+      done = !more && std::max(errors.yielded, errors.slipped) <= tolerance;
       if (done) break;
       const double least = errors.yielded > kFalls * last.yielded ? kYieldsLeast : kYieldsStiff;
       small = std::max(tolerance, kErrorLeft * std::max(errors.yielded, errors.slipped));

@@ -64,9 +64,10 @@ class Newton {
   };
   struct Bound {
     Row* row = nullptr;
-    PlaceIndex a, b;                 // of the bodies
-    size_t load = kNone;             // the contact that bounds it
-    double lever = 1.0;              // times this
+    PlaceIndex a, b;      // of the bodies
+    size_t load = kNone;  // the contact that bounds it
+    double lever = 1.0;   // times this
+    double response = 0.0;
     double weight = 0.0;             // stiffness of the spring
     double missing = 0.0;            // velocity error at the start of the solution
     double begun = 0.0, held = 0.0;  // impulse at the start, and at the last multiplier update
@@ -75,6 +76,8 @@ class Newton {
     double pulls = 0.0;               // current impulse
     bool active = false, was_active = false;
     Six J_a = Six::Zero(), J_b = Six::Zero();  // J L
+    size_t way = kNone;                        // in trees of joints, that which alone it drives,
+    double along = 0.0;                        // and by how much for a unit of impulse
   };
   enum class Zone : uint8_t { open, sticks, slips };
   // Normal, along, across; the last two in units in which the cone is round and of slope 1.
@@ -82,8 +85,8 @@ class Newton {
     Row* rows[3] = {};
     PlaceIndex a, b;
     double friction[2] = {};
-    double response_t = 0.0;              // of the tangential rows, the larger one
-    double weight = 0.0, weight_t = 0.0;  // stiffness of the springs
+    double response = 0.0, response_t = 0.0;  // of the tangential rows, the larger one
+    double weight = 0.0, weight_t = 0.0;      // stiffness of the springs
     Vec3 softness = Vec3::Zero(), missing = Vec3::Zero(), begun = Vec3::Zero(), held = Vec3::Zero();
     double slip = 0.0;  // speed that the aim assumes, times the friction
     double slip_error = 0.0, last_slip = 0.0, last_error = 0.0;  // of the aim's slip
@@ -96,9 +99,12 @@ class Newton {
   };
 
   Six scaled(int body, const Vec3& linear, const Vec3& angular) const;
+  double response_of(const Row& row, const Six& J_a, const Six& J_b) const;
   void set_bodies(const SolverBodies& bodies);
   Block scale_of(int body, const Vec3& arm) const;
   void start(const SolverBodies& bodies);
+  void leave_out_far();
+  bool look_at_far();
   void set_weights(double yields);
   void set_bounds();
   static double wanted(const Bound& bound, double part);
@@ -108,13 +114,16 @@ class Newton {
   void pull_in_zones();
   Vec3 stiffness_times(const Contact& contact, const Vec3& u) const;
   double slope(double part);
+  double curvature() const;
   double search();
   void go_on(double part);
   void find_gradient();
   bool same_zones() const;
   bool any_slips() const;
   void assemble();
-  void add_block(PlaceIndex a, PlaceIndex b, const auto& of_a, const auto& of_b);
+  template <class Rows>
+  Rows unscaled(PlaceIndex place, const Rows& J) const;
+  void add_block(PlaceIndex a, PlaceIndex b, const auto& scaled_a, const auto& scaled_b);
   void find_step();
   // The most that springs yielded, and that slips differ from what was assumed: m/s.
   struct Errors {
@@ -132,9 +141,12 @@ class Newton {
   std::vector<Six> y_, gradient_, step_, allowed_;  // by place, as L^-1 v
   std::vector<Bound> bounds_;
   std::vector<Contact> contacts_;
-  double yields_ = 0.0;  // softness of the springs, relative to the rows' responses
+  std::vector<Contact*> near_, far_;  // those that are solved for, and the others
+  double yields_ = 0.0;               // softness of the springs, relative to the rows' responses
   double slope_of_step_ = 0.0, square_of_step_ = 0.0;  // y step, step step
-  double curvature_ = 0.0;                             // at the last place of slope()
+  double first_slope_ = 0.0;                           // gradient step
+  double pulled_at_ = 0.0;  // the part of the step at which slope() was last
+  bool in_zones_ = false;   // whether the gradient is that of pull_in_zones()
 };
 
 }  // namespace ruedo::physics

@@ -139,6 +139,13 @@ class OnPlane final : public Pair {
   }
 };
 
+// Height of the lowest corner of the shape's bounding box.
+btScalar lowest_of_box(const btConvexShape& shape, const btTransform& X_WS, const btVector3& up) {
+  btVector3 low, high;
+  shape.getAabb(X_WS, low, high);
+  return up.dot(low + high) / 2 - up.absolute().dot(high - low) / 2;
+}
+
 // The lowest point of any other convex shape, and of its lowest side or edge.
 template <bool swapped>
 class ConvexOnPlane final : public Pair {
@@ -156,6 +163,9 @@ class ConvexOnPlane final : public Pair {
     const btTransform &X_WP = other.getWorldTransform(), &X_WS = body.getWorldTransform();
     const btVector3 up = X_WP.getBasis() * plane.getPlaneNormal();
     const btScalar ground = up.dot(X_WP.getOrigin()) + plane.getPlaneConstant();
+    if (lowest_of_box(shape, X_WS, up) - ground > std::max(kReach_m, seen_ahead_m) &&
+        !is_driven(*body.getCollisionObject()))
+      return;
     const auto add = [&](const btVector3& at) {
       const btScalar height = up.dot(at) - ground;
       result.addContactPoint(up, at - height * up, height);

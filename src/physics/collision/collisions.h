@@ -10,6 +10,9 @@
 
 namespace ruedo::physics {
 
+// Farther apart than this nothing of two sides is a contact.
+inline constexpr btScalar kReach_m = 0.02;
+
 // Registers them for all worlds.
 void register_collisions(btCollisionDispatcher& dispatcher);
 

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "physics/collision/closest_points.h"
+#include "physics/collision/collisions.h"
 #include "physics/collision/convex_shapes.h"
 #include "physics/collision/mesh_edges.h"
 
@@ -12,8 +13,6 @@ namespace ruedo::physics {
 
 namespace {
 
-// Farther apart than this nothing of two sides is a contact.
-constexpr btScalar kReach_m = 0.02;
 constexpr btScalar kFartherThanFirst_m = 1e-6;
 // A side's normal is preferred to the closest points' unless these are farther apart by more.
 constexpr btScalar kAsGood_m = 1e-7;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/base/newton.h"
 #include "physics/dynamics/friction_step.h"
 #include "ruedo/quantity.h"
 
@@ -137,6 +138,15 @@ Vec3 bounded(const Vec3& velocity) {
 }
 
 }  // namespace
+
+Solver::Solver(const ContactSurfaces& surfaces, const SolverSettings& settings)
+    : surfaces_(surfaces), settings_(settings), newton_(std::make_unique<Newton>()) {
+  bodies_.reserve(kUsually);
+  contacts_.reserve(kUsually);
+  pairs_.reserve(kUsually);
+}
+
+Solver::~Solver() = default;
 
 int Solver::body_of(const btCollisionObject& object) {
   const int index = object.getCompanionId();
@@ -372,14 +382,16 @@ double Solver::sweep(int number) {
 // The accuracy at which sweeps end. It follows the velocities of the last substep, which forces
 // have not changed yet: standing bodies are solved more accurately than moving ones.
 double Solver::tolerance() const {
-  if (!blocks_.empty() || bodies_.size() <= kFewBodies + 1) return settings_.tolerance_m_s;
+  if ((!blocks_.empty() && !reduced_) || bodies_.size() <= kFewBodies + 1)
+    return settings_.tolerance_m_s;
   double fastest = 0.0;
   for (size_t c = 0; c < contact_count_; ++c) {
     const ContactRows& contact = contacts_[c];
     for (const Row* row : {&contact.normal, &contact.along, &contact.across})
       fastest = std::max(fastest, std::abs(velocity_before(*row, bodies_)));
   }
-  return std::max(kStanding * settings_.tolerance_m_s, kOfSpeed * fastest);
+  const double least = (reduced_ ? 1.0 : kStanding) * settings_.tolerance_m_s;
+  return std::max(least, kOfSpeed * fastest);
 }
 
 // If that does not converge soon, all rows are solved at once; a solution that did not improve
@@ -482,9 +494,9 @@ bool Solver::newton_pays() {
   if (newton_known_) return newton_pays_;
   newton_known_ = true;
   if (reduced_) {
-    newton_.begin_trees(bodies_);
-    blocks_.tell_trees(newton_);
-    newton_.end_trees();
+    newton_->begin_trees(bodies_);
+    blocks_.tell_trees(*newton_);
+    newton_->end_trees();
     return newton_pays_ = true;
   }
   pairs_.clear();
@@ -496,7 +508,7 @@ bool Solver::newton_pays() {
   const double rows = 3.0 * static_cast<double>(contact_count_);
   newton_pays_ =
       contact_count_ > 0 && !blocks_.has_gears() && bodies_.size() > kFewBodies &&
-      newton_.prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
+      newton_->prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
   return newton_pays_;
 }
 
@@ -519,24 +531,24 @@ bool Solver::solve_joined() {
 
 // In reduced coordinates the joints must hold before, and are to be swept again.
 void Solver::solve_at_once() {
-  newton_.begin();
+  newton_->begin();
   if (reduced_) {
     blocks_.sweep(bodies_);
-    blocks_.tell_motors(newton_);
+    blocks_.tell_motors(*newton_);
   } else {
-    blocks_.tell_rows(newton_, bodies_);
+    blocks_.tell_rows(*newton_, bodies_);
   }
   for (size_t c = 0; c < contact_count_; ++c) {
     ContactRows& contact = contacts_[c];
     if (contact.normal.inverse == 0.0) continue;
-    const size_t load = newton_.add(contact.normal, contact.along, contact.across, contact.friction,
-                                    contact.friction2);
-    if (contact.spinning > 0.0) newton_.add(contact.spin, load, contact.spinning);
+    const size_t load = newton_->add(contact.normal, contact.along, contact.across,
+                                     contact.friction, contact.friction2);
+    if (contact.spinning > 0.0) newton_->add(contact.spin, load, contact.spinning);
     for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
-      newton_.add(contact.roll[k], load, contact.rolling);
+      newton_->add(contact.roll[k], load, contact.rolling);
   }
-  newton_.solve(bodies_, (reduced_ ? kOfToleranceReduced : kOfTolerance) * tolerance_m_s_,
-                kNewtonSteps);
+  newton_->solve(bodies_, (reduced_ ? kOfToleranceReduced : kOfTolerance) * tolerance_m_s_,
+                 kNewtonSteps);
   if (reduced_) blocks_.sweep(bodies_);
 }
 

@@ -18,16 +18,18 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "physics/base/bullet.h"
-#include "physics/base/newton.h"
 #include "physics/base/rows.h"
 #include "physics/dynamics/joined_contacts.h"
 #include "physics/dynamics/load_shares.h"
 #include "physics/joints/joint_block.h"
 
 namespace ruedo::physics {
+
+class Newton;
 
 // The combined properties of two surfaces in contact.
 struct ContactSurface {
@@ -56,12 +58,10 @@ struct SolverSettings {
 
 class Solver {
  public:
-  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings)
-      : surfaces_(surfaces), settings_(settings) {
-    bodies_.reserve(kUsually);
-    contacts_.reserve(kUsually);
-    pairs_.reserve(kUsually);
-  }
+  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings);
+  ~Solver();
+  Solver(const Solver&) = delete;
+  Solver& operator=(const Solver&) = delete;
 
   // Solves one island for a substep: applies the bodies' forces and gravity, and advances
   // velocities and poses. The order of the arguments affects the last bits.
@@ -124,7 +124,7 @@ class Solver {
   JointBlocks blocks_;
   LoadShares shares_;
   double tolerance_m_s_ = 0.0;  // of this island
-  Newton newton_;
+  std::unique_ptr<Newton> newton_;
   JoinedContacts joined_;
   bool newton_known_ = false, newton_pays_ = false;  // for this island
   bool reduced_ = false;  // Newton's method, for this island, in reduced coordinates

@@ -9,11 +9,12 @@
 #include <optional>
 #include <vector>
 
-#include "physics/base/newton.h"
 #include "physics/base/rows.h"
 #include "physics/joints/joint_tree.h"
 
 namespace ruedo::physics {
+
+class Newton;
 
 // Of a mechanism with loops; its other rows are relaxed.
 inline constexpr size_t kMostRowsAtOnce = 256;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "physics/base/newton.h"
 #include "physics/joints/joint_block.h"
 #include "physics/joints/joint_frames.h"
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "physics/base/newton.h"
+
 namespace ruedo::physics {
 
 namespace {

@@ -10,10 +10,11 @@
 
 #include <vector>
 
-#include "physics/base/newton.h"
 #include "physics/base/rows.h"
 
 namespace ruedo::physics {
+
+class Newton;
 
 // The degrees of freedom of a joint's second body relative to the first one, which carries axis and
 // anchor.
