@@ -4,6 +4,7 @@ engine.
 
 import math
 import random
+import re
 import struct
 import zlib
 
@@ -448,10 +449,16 @@ def test_weights_of_rewards():
     plain.close(), weighted.close()
 
 
-@pytest.mark.parametrize("task", ["Navigate", "Corridor", "Crowd", "Push", "Camera"])
+# Seconds of the table in docs/environments.md, of 0.1 s each.
+SECONDS = {
+    "Navigate": 40, "Corridor": 80, "Crowd": 60, "Push": 60, "Camera": 40, "Hills": 60, "Reach": 10,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("task", SECONDS)
 def test_max_episode_steps_is_the_specs_and_may_be_given(task):
     name = f"ruedo/{task}-v0"
-    assert gymnasium.spec(name).max_episode_steps in (400, 600, 800)
+    assert gymnasium.spec(name).max_episode_steps == 10 * SECONDS[task]
     envs = gymnasium.make_vec(name, num_envs=2, max_episode_steps=3)
     one = gymnasium.make(name, max_episode_steps=3)
     envs.reset(seed=1), one.reset(seed=1)
@@ -545,6 +552,54 @@ def test_a_curriculum_changes_the_task():
         envs.reset()
         assert all(scene.sdf.count("name='obstacle") == obstacles for scene in envs.scenes)
     envs.close()
+
+
+def test_hills_and_people_are_as_many_as_the_option_says():
+    for task, option, counts in (
+        (ruedo.gym.HillsVectorEnv, "hills", (0, 3, 20)),
+        (ruedo.gym.CrowdVectorEnv, "people", (0, 4)),
+    ):
+        for count in counts:
+            envs = task(1, beams=4, **{option: count})
+            envs.reset(seed=1)
+            sdf = envs.scenes[0].sdf
+            found = sdf.count("<model name='hill") if option == "hills" else people_of(sdf)
+            assert found == count, (option, sdf)
+            envs.close()
+
+
+def people_of(sdf):
+    return sum(int(count) for count in re.findall(r"<ruedo:count>(\d+)</ruedo:count>", sdf))
+
+
+def test_sonar_and_depth_have_the_scale_of_the_scan():
+    """A wall 2.05 m ahead of the robot: what each measures, divided by 8 m."""
+
+    class Facing(ruedo.gym.DriveTask):
+        def scene(self, number):
+            world = ruedo.World().robot(self.robot, name="robot").wall(2.05, -3, 2.05, 3, height=3)
+            return Room(number, str(world), (0.0, 0.0, 0.0), (1.0, 0.0))
+
+        def outcome(self):
+            nothing = np.zeros(self.num_envs)
+            return nothing, nothing > 0, nothing > 0
+
+    env = ruedo.gym.TaskEnv(
+        Facing, sensors=["lrf", "sonar", "depth"], beams=3, pixels=8, observations="dict",
+        noise=False,
+    )  # fmt: skip
+    env.reset(seed=1)
+    for _ in range(5):  # of 0.1 s: each sonar has measured
+        seen = env.step([-1.0, 0.0])[0]
+    engine = env.task.engine
+    metres = engine.observe("lrf.ranges")[0, 0]
+    np.testing.assert_allclose(seen["ranges"], np.minimum(metres / 8, 1.0), rtol=1e-6)
+    assert seen["ranges"][1] == pytest.approx(metres[1] / 8) and 1.5 < metres[1] < 2.0
+    assert seen["sonar"].min() == pytest.approx(1.7 / 8, abs=0.3 / 8)
+    assert seen["sonar"].max() == pytest.approx(5 / 8)  # their range
+    assert seen["depth"].shape == (8, 8, 1)
+    assert seen["depth"][3, 4, 0] == pytest.approx(seen["ranges"][1], abs=0.3 / 8)
+    env.close()
 
 
 @pytest.mark.parametrize(
