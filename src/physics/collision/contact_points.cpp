@@ -182,6 +182,16 @@ btScalar ahead_of(const btCollisionObject& a, const btCollisionObject& b, btScal
   return std::max(kSeenAhead_m, (speed + fall) * substep_s);
 }
 
+// Whether their boxes are farther apart than that.
+bool apart(const btCollisionObject& a, const btCollisionObject& b, btScalar by) {
+  btVector3 low_a, high_a, low_b, high_b;
+  a.getCollisionShape()->getAabb(a.getWorldTransform(), low_a, high_a);
+  b.getCollisionShape()->getAabb(b.getWorldTransform(), low_b, high_b);
+  btVector3 gap = low_a - high_b;
+  gap.setMax(low_b - high_a);
+  return gap[gap.maxAxis()] > by;
+}
+
 void see_ahead(btCollisionObject& object, btScalar by) {
   if (object.getCollisionShape()->isCompound())
     static_cast<BodyShape&>(*object.getCollisionShape()).see_ahead(by);
@@ -407,11 +417,15 @@ void collide(btBroadphasePair& pair, btDispatcher& dispatcher, const btDispatche
                                       -1);
   const btCollisionObjectWrapper of_b(nullptr, b.getCollisionShape(), &b, b.getWorldTransform(), -1,
                                       -1);
-  if (!pair.m_algorithm)
+  const btScalar ahead = ahead_of(a, b, info.m_timeStep);
+  if (!pair.m_algorithm) {
+    // The broad phase's pairs are those within decimetres: of small things, all.
+    if (!is_driven(a) && !is_driven(b) && apart(a, b, std::max(kReach_m, ahead))) return;
     pair.m_algorithm = dispatcher.findAlgorithm(&of_a, &of_b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+  }
   if (!pair.m_algorithm) return;
   scratch.substep_s = info.m_timeStep;
-  seen_ahead_m = ahead_of(a, b, info.m_timeStep);
+  seen_ahead_m = ahead;
   see_ahead(a, seen_ahead_m);
   see_ahead(b, seen_ahead_m);
   if (seen_ahead_m > kReach_m) {
