@@ -8,23 +8,17 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from programs import needs_arm64, program
 
 HERE = Path(__file__).resolve().parent
-SOURCE = HERE.parents[1]
 EXPECTED = dict(
     line.split() for line in (HERE / "hashes.txt").read_text(encoding="ascii").splitlines()
 )
 PROCESSOR = os.environ["RUEDO_PROCESSOR"]
 THREADS = [1, 2] if PROCESSOR == "native" else [2]
-PROGRAM = "tests/golden/golden_runs"
+COMMAND = program("tests/golden/golden_runs", PROCESSOR)
 if PROCESSOR == "aarch64":
-    COMMAND = [SOURCE / "scripts/on_arm64", SOURCE / "build/arm64" / PROGRAM]
-    if not COMMAND[1].exists():
-        pytestmark = pytest.mark.skip("build/arm64 is not there (docs/platforms.md, ARM)")
-else:
-    COMMAND = [Path(os.environ["RUEDO_BINARY_DIR"]) / PROGRAM]
-    if PROCESSOR != "native":
-        COMMAND = ["qemu-x86_64", "-cpu", PROCESSOR, *COMMAND]
+    pytestmark = needs_arm64
 
 
 @pytest.mark.parametrize("threads", THREADS)
