@@ -278,6 +278,8 @@ def _refined(
         found = found.part(seen.reach[found.reading] - found.residual < farthest - _GATE * sigma)
         reach = seen.reach[found.reading]
         residuals = Residuals(found.residual, reach, found.incidence, 1.0)
+        if turn == 0:  # of _ANY_NOISE, which may be more than all there is
+            found.line[:] = 0.0
         model, relative = fit_beams(residuals, np.hypot(found.line, step / np.sqrt(12)))
         variance = model.sigma(reach, found.incidence) ** 2 + found.line**2
         before, place = place, _moved(place, found, variance, seen.scan[found.reading])
