@@ -125,7 +125,7 @@ def test_place_and_clock_of_the_range_finder(tmp_path):
         fit_rangefinder([recording], np.zeros(3))
 
 
-def test_what_a_drive_does_not_show_of_the_mount(tmp_path):
+def test_a_straight_drive_does_not_determine_the_mount(tmp_path):
     """Straight ahead, the place of the range finder on the robot changes nothing."""
     rng = np.random.default_rng(4)
     time = np.arange(0, 60, 0.25)
