@@ -52,7 +52,9 @@ def test_room_of_exact_walls(tmp_path):
 def ranges_beside_pillar(x, y, angles):
     """Exact ranges (m) in a room of 6 x 6 m around a pillar of 0.3 m radius, both at the origin."""
     cosine, sine = np.cos(angles), np.sin(angles)
-    walls = np.minimum((3 - x * np.sign(cosine)) / abs(cosine), (3 - y * np.sign(sine)) / abs(sine))
+    with np.errstate(divide="ignore"):  # along a wall
+        ways = [(3 - x * np.sign(cosine)) / abs(cosine), (3 - y * np.sign(sine)) / abs(sine)]
+    walls = np.minimum(*ways)
     ahead, miss = -(x * cosine + y * sine), x * sine - y * cosine
     meets = (ahead > 0) & (abs(miss) < 0.3)
     return np.where(meets, ahead - np.sqrt(np.maximum(0.09 - miss**2, 0)), walls)

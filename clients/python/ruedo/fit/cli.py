@@ -62,6 +62,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X,Y,YAW",
         help="of the range finder on the robot, m and rad (default: as in the model)",
     )
+    one.add_argument(
+        "--world", metavar="WORLD", help="where the drives were: beams by what they met there"
+    )
     one.add_argument("-o", "--output", metavar="FILE", help="the fitted model, SDF")
     one.add_argument("--report", metavar="FILE", help="an HTML page with plots")
     one.add_argument("--json", action="store_true", help="print the values as JSON")
@@ -241,6 +244,7 @@ def _check_folder(file: str | None) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> int:
+    from .beams import check_world
     from .fitting import fit, read_robot, save
     from .read import read
     from .resume import Kept
@@ -251,9 +255,13 @@ def _fit(arguments: argparse.Namespace) -> int:
     _check_folder(arguments.report)
     robot = read_robot(arguments.robot) if arguments.robot else None
     recordings = [read(one, arguments.of) for one in arguments.LOG]
+    world = arguments.world
+    if world:
+        check_world(world)
     files = [*arguments.LOG, *([robot.file] if robot else [])]
-    kept = Kept(files, (arguments.of, arguments.mount))
-    answer = fit(recordings, robot, arguments.mount, kept)
+    files += [world] if world and File(world).is_file() else []
+    kept = Kept(files, (arguments.of, arguments.mount, world))
+    answer = fit(recordings, robot, arguments.mount, kept, world)
     if arguments.output:
         assert robot is not None
         save(answer, robot, File(arguments.output))

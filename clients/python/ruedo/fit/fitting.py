@@ -15,6 +15,7 @@ import numpy as np
 from ..engine import Engine
 from ..launching import find_ruedo
 from .align import find_path
+from .beams import HEIGHT_M, fit_beams_in
 from .drives import Drive
 from .errors import FitError
 from .estimate import Estimate, normal
@@ -119,11 +120,12 @@ def fit(
     robot: Robot | None = None,
     mount: Sequence[float] | None = None,
     kept: Kept | None = None,
+    world: str | File | None = None,
 ) -> Fit:
     """Everything that the logs determine. mount: x, y (m), heading (rad) of the range finder on the
     robot; None: the model's, or the origin where the log gives the range finder's own poses. kept:
-    where the results of each stage are kept until the last one is done. Raises FitError where
-    nothing is determined.
+    where the results of each stage are kept until the last one is done. world: where the drives
+    were. Raises FitError where nothing is determined, and RuedoError for the world.
     """
     answer = Fit(list(recordings))
     for one in recordings:
@@ -132,6 +134,7 @@ def fit(
     stages: list[Callable[[], None]] = [
         lambda: _fit_drive(answer, robot),
         lambda: _fit_scans(answer, robot, mount),
+        lambda: _fit_beams(answer, robot, mount, world),
         lambda: _fit_motion(answer),
         lambda: _fit_streams(answer),
     ]
@@ -207,6 +210,22 @@ def _fit_scans(answer: Fit, robot: Robot | None, mount: Sequence[float] | None) 
         for path in paths[one.name]:
             value = "gaussian" if path.endswith("type") else f"{one.value:.5g}"
             answer.settings.append(Setting(path, value, source + interval))
+
+
+def _fit_beams(
+    answer: Fit, robot: Robot | None, mount: Sequence[float] | None, world: str | File | None
+) -> None:
+    recording = next((one for one in answer.recordings if one.scans is not None), None)
+    if world is None or recording is None:
+        return
+    assert recording.scans is not None
+    place = mount_on(recording, robot) if mount is None else np.asarray(mount, float)
+    device = None if robot is None else rangefinder_of(robot, recording.scans.ranges.shape[1])
+    height = HEIGHT_M if device is None else float(device["position"][2])
+    try:
+        answer.parts[f"Beams in {world}"] = fit_beams_in(world, recording, place, height)
+    except FitError as error:
+        answer.remarks.append(f"shares of beams are not fitted: {error}")
 
 
 def rangefinder_of(robot: Robot, rays: int) -> dict[str, Any] | None:

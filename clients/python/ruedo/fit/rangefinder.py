@@ -362,9 +362,7 @@ def _no_returns(recording: Recording, keys: NDArray[np.int64]) -> list[Estimate]
     seen = data.ranges[keys]
     lost = ~np.isfinite(seen) | (seen >= data.max_range)
     count, missing = seen.size, int(lost.sum())
-    why = (
-        "of all beams: open space is in it; by range, incidence and reflectance it needs the world"
-    )
+    why = "of all beams, and open space; with --world: by range, incidence, reflectance"
     return [_share("share of beams without return", missing / count, count, why)]
 
 
