@@ -17,6 +17,8 @@ from ..launching import find_ruedo
 from .align import find_path
 from .beams import HEIGHT_M, fit_beams_in
 from .drives import Drive
+from .encoders import NAME as TICKS
+from .encoders import fit_ticks
 from .errors import FitError
 from .estimate import Estimate, normal
 from .mapping import own_mount
@@ -168,6 +170,7 @@ def _fit_drive(answer: Fit, robot: Robot | None) -> None:
         answer.remarks.append(f"odometry is not fitted: {error}")
         return
     answer.odometry = found
+    found.estimates.append(fit_ticks(first))
     answer.parts["Odometry"] = found.estimates
     if geometry.kind == "differential" and robot is not None:
         _drive_settings(answer, found, robot)
@@ -341,6 +344,11 @@ def _drive_settings(answer: Fit, found: OdometryFit, robot: Robot) -> None:
     if found.determined[2]:
         put("ruedo:drive/ruedo:track", f"{found.parameters[2]:.6g}", [by_name["track"]])
         put("ruedo:odometry/ruedo:track_error", f"{errors[2]:.5g}", [by_name["track error"]])
+    if TICKS in by_name:
+        ticks, why = round(by_name[TICKS].value or 0), by_name[TICKS].why
+        answer.settings.append(
+            Setting("ruedo:odometry/ruedo:ticks_per_turn", f"{ticks}", source + why)
+        )
     if "slip noise" in by_name:
         put("ruedo:odometry/ruedo:slip_noise", f"{found.slip:.5g}", [by_name["slip noise"]])
 
