@@ -27,10 +27,10 @@ _MOST_SCANS = 1000
 _LEAST_BEAMS = 100  # of a class
 _BENT = 0.3  # rad between two beams' ends, from which on they lie on two surfaces
 _FARTHEST_M = 1000.0
-_RANGES_M = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # edges of classes, as the next
+_RANGES_M = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, np.inf)  # edges of classes, as the next
 _INCIDENCES_DEG = (0.0, 30.0, 60.0, 75.0, 90.0)
 _REFLECTANCES = (0.0, 0.05, 0.2, 0.5, 1.0)
-_ALIKE = 0.01  # reflectances that differ by less
+_LEAST_SHARE = 0.02  # of a reflectance: beams at the steps of an imported wall seem to have others
 _FINDER = """<sdf version="1.9" xmlns:ruedo="urn:ruedo"><model name="{name}">
 <ruedo:path>{path}<ruedo:loop>false</ruedo:loop></ruedo:path>
 <link name="link"><sensor name="beams" type="lidar"><update_rate>0</update_rate><lidar><scan>
@@ -85,18 +85,28 @@ def _classes(met: Met, judged: NDArray[np.bool_]) -> list[tuple[str, NDArray[np.
     """Names, and which beams each has: of range, of incidence and, where it varies, of
     reflectance.
     """
-    quantities: list[tuple[str, Array, tuple[float, ...], str]]
-    quantities = [("", met.reach, _RANGES_M, " m")]
-    quantities += [("incidence ", np.degrees(met.incidence), _INCIDENCES_DEG, " deg")]
-    if np.ptp(met.reflectance[judged]) > _ALIKE:
-        quantities += [("reflectance ", met.reflectance, _REFLECTANCES, "")]
+    reflectances = _of("reflectance ", met.reflectance, _REFLECTANCES, "", judged)
+    least = _LEAST_SHARE * judged.sum()
+    reflectances = [one for one in reflectances if one[1].sum() >= least]
+    return [
+        *_of("", met.reach, _RANGES_M, " m", judged),
+        *_of("incidence ", np.degrees(met.incidence), _INCIDENCES_DEG, " deg", judged),
+        *(reflectances if len(reflectances) > 1 else []),
+    ]
+
+
+def _of(
+    what: str, value: Array, edges: tuple[float, ...], unit: str, judged: NDArray[np.bool_]
+) -> list[tuple[str, NDArray[np.bool_]]]:
+    """The classes between these edges that have enough beams."""
+    number = np.digitize(
+        np.minimum(value, np.nextafter(edges[-1], 0)), edges
+    )  # the last edge is in
     found = []
-    for what, value, edges, unit in quantities:
-        for low, high in pairwise(edges):
-            last = high == edges[-1]
-            some = judged & (value >= low) & ((value <= high) if last else (value < high))
-            if some.sum() >= _LEAST_BEAMS:
-                found.append((f"{what}{low:g} to {high:g}{unit}", some))
+    for k, (low, high) in enumerate(pairwise(edges), 1):
+        some = judged & (number == k)
+        if some.sum() >= _LEAST_BEAMS:
+            found.append((f"{what}{low:g} to {high:g}{unit}", some))
     return found
 
 
