@@ -59,7 +59,6 @@ NOT_RUN = {
     ("platforms.md", "mvn"): "tests/package/test_maven.py",
     ("platforms.md", "python3 -m venv"): INSTALLS,
     ("platforms.md", "scripts/sysroot"): "scripts/test --nightly does it, for golden.aarch64",
-    ("platforms.md", "packaging/exchange_logs"): "needs a program for aarch64, emulated: by hand",
     ("platforms.md", "scripts/release"): "needs podman, and its images from elsewhere",
     ("plugins.md", "find_package"): "the core of docs/example-plugin: tests/package/test_plugin.py",
     ("plugins.md", "<ruedo:drive"): "part of docs/example-plugin: tests/package/test_plugin.py",
