@@ -34,7 +34,9 @@ for (const [colorScheme, width, toggled] of [
   await page.locator(".md-search__input").click();
   await page.keyboard.type(words);
   const results = page.locator(".md-search-result__item");
-  await results.first().waitFor();
+  // Results are shown from the first letters on; those of all words have the last one.
+  const last = words.split(" ").at(-1);
+  await results.and(page.locator(":first-child", { hasText: new RegExp(last, "i") })).waitFor();
   const scheme = await page.evaluate(() => document.body.dataset.mdColorScheme);
   if (process.env.PICTURES)
     await page.screenshot({ path: join(process.env.PICTURES, `search-${scheme}-${width}.png`) });

@@ -32,7 +32,7 @@ def test_step_of_angles(tmp_path, ticks, decimals):
     assert found.value == pytest.approx(ticks, rel=1e-5)
 
 
-def test_what_shows_no_step(tmp_path):
+def test_other_angles_have_no_step(tmp_path):
     assert "finer than the log shows" in fit_ticks(recording_of(drawn(1), tmp_path)).why
     assert "hardly turn" in fit_ticks(recording_of(np.zeros((500, 2)), tmp_path)).why
     assert "no encoders" in fit_ticks(Recording(tmp_path / "a.csv", "CSV")).why

@@ -32,7 +32,7 @@ def fit_ticks(recording: Recording) -> Estimate:
 
 
 def _step_of(changes: Array) -> float:
-    """0 where there is none. From the smallest changes on, since errors of the step multiply."""
+    """The step (rad), or 0. From the smallest changes on, since errors of the step multiply."""
     step = _common_divisor(changes[:_FIRST])
     for count in np.geomspace(_FIRST, len(changes), 10).astype(int) if step else []:
         counts = np.round(changes[:count] / step)
@@ -41,7 +41,7 @@ def _step_of(changes: Array) -> float:
 
 
 def _common_divisor(changes: Array) -> float:
-    """By Euclid's algorithm; 0 where there is none."""
+    """Of all changes, by Euclid's algorithm (rad), or 0."""
     step = 0.0
     for change in changes.tolist():
         while change > _LEAST / 2:
