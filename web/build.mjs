@@ -1,10 +1,11 @@
 // Bundles the page and writes it as one C++ file of compressed bytes, which the program serves.
 // Usage: node build.mjs OUTPUT.cpp, in a folder with src, generated and node_modules.
 import { readFileSync, writeFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
+import { gzipSync } from "fflate"; // gives the same bytes with each version of Node
 
 const [output] = process.argv.slice(2);
+const pack = (bytes) => gzipSync(bytes, { level: 9, mtime: 0 });
 // The licences of what is bundled want their notices with it.
 const notices = [
   ["three", "LICENSE"],
@@ -46,7 +47,7 @@ for (const file of bundle.outputFiles) {
 let code =
   '// The web page, made by web/build.mjs.\n#include "console/assets.h"\n\nnamespace ruedo::console {\nnamespace {\n';
 const entries = files.map(({ path, name, bytes }, index) => {
-  const packed = gzipSync(bytes, { level: 9 });
+  const packed = pack(bytes);
   const rows = [];
   for (let at = 0; at < packed.length; at += 32)
     rows.push([...packed.subarray(at, at + 32)].join(","));
@@ -64,7 +65,7 @@ document.body.append(script);`;
 const parts = {
   "/icon.svg": `data:image/svg+xml;base64,${Buffer.from(text("src/icon.svg")).toString("base64")}`,
   '<link rel="stylesheet" href="/main.css" />': `<style>${text("main.css")}</style>`,
-  '<script type="module" src="/main.js"></script>': `<script type="text/plain" id="code">${gzipSync(Buffer.from(text("main.js")), { level: 9 }).toString("base64")}</script>\n<script type="module">${boot}</script>`,
+  '<script type="module" src="/main.js"></script>': `<script type="text/plain" id="code">${Buffer.from(pack(Buffer.from(text("main.js")))).toString("base64")}</script>\n<script type="module">${boot}</script>`,
 };
 let alone = text(files[0].name).replace(/<\/body>[^]*$/, "");
 for (const [link, content] of Object.entries(parts)) {

@@ -32,7 +32,7 @@ file(GLOB message ${SOURCES}/src/ruedo/lcmtypes/*.java ${SOURCES}/src/lcm/lcm/*.
 run(${JAVAC} --release 11 -nowarn -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${generated} ${message})
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${library})
 file(COPY ${LICENSE} DESTINATION ${work}/classes/META-INF)
-file(WRITE ${work}/manifest "Automatic-Module-Name: ruedo\nImplementation-Title: ruedo\nImplementation-Version: ${VERSION}\n")
+file(WRITE ${work}/manifest "Created-By: ruedo\nAutomatic-Module-Name: ruedo\nImplementation-Title: ruedo\nImplementation-Version: ${VERSION}\n")
 make_jar(${OUTPUT}/ruedo.jar ${work}/classes --manifest ${work}/manifest)
 
 file(GLOB examples ${SOURCES}/examples/*.java)
