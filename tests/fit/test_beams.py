@@ -110,4 +110,4 @@ def test_a_fit_takes_a_world(room, tmp_path):
     beams = {one["name"]: one["value"] for one in json.loads(said)["parts"][f"Beams in {room}"]}
     assert beams["share without return, reflectance 0.05 to 0.2"] == 1.0
     assert beams["share without return, reflectance 0.5 to 1"] == 0.0
-    assert "nowhere" in ruedo("fit", log, "--world", "nowhere", code=4)[1]
+    assert "nowhere" in ruedo("fit", log, "--world", "nowhere", code=3)[1]

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path as File
 from typing import Any
 
-from ..errors import LaunchError, NotSupported, RuedoError
+from ..errors import BadWorld, LaunchError, NotSupported, RuedoError
 from ..terminal import drop, flush, say, tell
 from .errors import FitError, UsageError
 
@@ -37,6 +37,9 @@ def main(words: list[str]) -> int:
     except BrokenPipeError:
         drop(1)
         return GOOD
+    except BadWorld as error:
+        tell(f"ruedo: {error}")
+        return BAD_INPUT
     except RuedoError as error:
         tell(f"ruedo: {error}")
         return ENVIRONMENT

@@ -8,7 +8,7 @@ from .estimate import Estimate
 from .recording import Array, Recording
 
 NAME = "encoder ticks per turn"
-_NOISE = 1e-6  # rad, of an angle in a file; smaller changes are none
+_NOISE = 1e-6  # rad, of an angle in a file: a wheel stands at smaller changes
 _LEAST = 50 * _NOISE  # of a tick, to be told from that
 _LEAST_CHANGES = 100
 _FIRST = 50  # of the smallest changes: they give a first idea of the step
