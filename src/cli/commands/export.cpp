@@ -80,7 +80,8 @@ void export_bag(const ExportArguments& arguments, const log::Index& index,
   options.channels = logged.remaps;
   options.topics = parse_remaps(arguments.remaps);
   ros2::Rosbag bag(without_slash(arguments.bag), options);
-  const uint64_t read = read_log(arguments.log, index, worlds, bag, [&] { return bag.size(); });
+  const uint64_t read =
+      read_log(arguments.log, index, worlds, bag, [&] { return bag.find_size(); });
   bag.finish(index.header(), arguments.log);
   fmt::print(
       "{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message "

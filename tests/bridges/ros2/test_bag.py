@@ -17,6 +17,7 @@ import lcm
 import mcap.writer
 import pytest
 import ruedo as ruedo_client
+import zstandard
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -271,9 +272,14 @@ def test_the_console_shows_of_a_bag_what_it_shows_of_the_log(logged, tmp_path):
         of_bag = page(bag, tmp_path / "bag.html")
         assert len(of_bag) == pytest.approx(len(of_log), abs=100)  # the name is another one
     with (logged / "run/run_0.mcap").open("rb") as file:
-        (rest,) = (one for one in make_reader(file).iter_attachments() if one.name == "run.lcm")
+        found = {one.name: one.data for one in make_reader(file).iter_attachments()}
     # Neither scans nor pictures are there twice.
-    assert {"p3at/lrf", "p3at/camera"}.isdisjoint(log_channels(rest.data, tmp_path))
+    rest = unpacked(found["run.lcm.zst"])
+    assert {"p3at/lrf", "p3at/camera"}.isdisjoint(log_channels(rest, tmp_path))
+
+
+def unpacked(data):
+    return zstandard.ZstdDecompressor().decompressobj().decompress(data)
 
 
 def log_channels(data, folder):
@@ -455,6 +461,18 @@ def test_attachments_take_no_more_of_the_disk_than_a_bag_may(tmp_path):
     assert used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime < 5
 
 
+def test_a_packed_log_that_is_damaged(logged, tmp_path):
+    bad = tmp_path / "bad.mcap"
+    with (logged / "run/run_0.mcap").open("rb") as file:
+        (good,) = (
+            one.data for one in make_reader(file).iter_attachments() if one.name == "run.lcm.zst"
+        )
+    attachments(bad, ("run.lcm.zst", good[:-100], 0))
+    assert "has an attachment that is cut off (zstd)" in refused(bad)
+    attachments(bad, ("run.lcm.zst", b"run.lcm", 0))
+    assert "has an attachment that is not what was written (zstd)" in refused(bad)
+
+
 @pytest.mark.parametrize(
     "names",
     [
@@ -494,7 +512,7 @@ def test_other_libraries_read_and_write_attachments(logged, tmp_path):
     with (logged / "run/run_0.mcap").open("rb") as file:
         found = {one.name: one.data for one in make_reader(file).iter_attachments()}
     assert found[str(SOURCE / "worlds/arena.sdf")] == (SOURCE / "worlds/arena.sdf").read_bytes()
-    (tmp_path / "rest.lcm").write_bytes(found["run.lcm"])
+    found["run.lcm"] = unpacked(found.pop("run.lcm.zst"))  # as earlier versions wrote it
     with (tmp_path / "run.mcap").open("wb") as file:
         writer = mcap.writer.Writer(file, compression=mcap.writer.CompressionType.NONE)
         writer.start()

@@ -22,6 +22,7 @@
 #include "log/mcap_reader.h"
 #include "log/reader.h"
 #include "log/writer.h"
+#include "log/zstd_file.h"
 #include "ruedo/errors.h"
 #include "system/to_stderr.h"
 
@@ -105,8 +106,9 @@ fs::path place_below(const fs::path& folder, const std::string& name, const std:
 // The room that a bag needs on the disk: its length may be forged, and needs none in a sparse file.
 class Room {
  public:
+  uint64_t left() const { return Rosbag::kMostAttachedBytes - bytes_; }
   void take(const std::string& bag, uint64_t size) {
-    if (size > Rosbag::kMostAttachedBytes - bytes_)
+    if (size > left())
       throw InputError({bag}, fmt::format("has attachments of more than {} bytes in all",
                                           Rosbag::kMostAttachedBytes));
     bytes_ += size;
@@ -137,20 +139,25 @@ BagLog::BagLog(const std::string& path) : log_(path) {
 
 void BagLog::restore(const std::string& file, const std::string& name) {
   const fs::path run = *folder_ / "run";  // the log, and the world's files beside it
-  const std::string rest = *folder_ / Rosbag::kRest;
+  const std::string rest = *folder_ / Rosbag::kPlainRest;
   fs::create_directories(run);
   log_ = (run / (name + ".lcm")).string();
   const std::ofstream taken(log_);  // its name: an attachment could be a folder of it
   bool has_rest = false;
   Room room;
-  log::read_mcap(file, {{}, [&](const std::string& name, uint64_t offset, uint64_t size) {
-                          room.take(file, size);
-                          const bool is_rest = name == Rosbag::kRest;
-                          has_rest |= is_rest;
-                          const fs::path to =
-                              is_rest ? fs::path(rest) : place_below(run, name, file);
-                          if (!to.empty()) copy_part(file, offset, size, to);
-                        }});
+  const auto extract = [&](const std::string& name, uint64_t offset, uint64_t size) {
+    if (name == Rosbag::kRest) {
+      has_rest = true;
+      room.take(file, log::unpack_part(file, offset, size, rest, room.left()));
+      return;
+    }
+    room.take(file, size);
+    const bool is_rest = name == Rosbag::kPlainRest;
+    has_rest |= is_rest;
+    const fs::path to = is_rest ? fs::path(rest) : place_below(run, name, file);
+    if (!to.empty()) copy_part(file, offset, size, to);
+  };
+  log::read_mcap(file, {{}, extract});
   if (!has_rest)
     throw InputError({file},
                      "holds no run of Ruedo's: its scene is not known. Bags are shown that "

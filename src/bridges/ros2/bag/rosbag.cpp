@@ -11,6 +11,7 @@
 #include "bridges/ros2/services/restore.h"
 #include "engine/markers.h"
 #include "log/header.h"
+#include "log/zstd_file.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/world_info_t.hpp"
@@ -67,7 +68,7 @@ Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options)
   leftover_.emplace(folder_);
   file_ = fs::path(folder_).filename().string() + "_0.mcap";
   out_ = std::make_unique<log::McapWriter>((fs::path(folder_) / file_).string(), "ros2");
-  rest_file_ = (fs::path(folder_) / (std::string(".") + kRest)).string();
+  rest_file_ = (fs::path(folder_) / (std::string(".") + kPlainRest)).string();
   rest_ = std::make_unique<log::Writer>(rest_file_);
 }
 
@@ -77,6 +78,7 @@ Rosbag::~Rosbag() {
   rest_.reset();
   std::error_code error;
   fs::remove(rest_file_, error);
+  fs::remove(packed_rest_file(), error);
   fs::remove(folder_, error);
 }
 
@@ -216,12 +218,23 @@ std::string Rosbag::metadata() const {
   return text;
 }
 
-void Rosbag::finish(const std::optional<log_header_t>& header, const std::string& log) {
+void Rosbag::pack_rest() {
   rest_->flush();
   if (!rest_->error().empty()) throw EnvironmentError(rest_file_ + ": " + rest_->error());
-  out_->add_attachment(kRest, "application/x-lcm-log", rest_file_);
+  log::pack_file(rest_file_, packed_rest_file());
+}
+
+uint64_t Rosbag::find_size() {
+  pack_rest();
+  return out_->size() + fs::file_size(packed_rest_file());
+}
+
+void Rosbag::finish(const std::optional<log_header_t>& header, const std::string& log) {
+  pack_rest();
   std::error_code error;
   fs::remove(rest_file_, error);
+  out_->add_attachment(kRest, "application/zstd", packed_rest_file());
+  fs::remove(packed_rest_file(), error);
   if (header) attach_files(*header, log);
   out_->finish();
   write_file((fs::path(folder_) / "metadata.yaml").string(), metadata());

@@ -41,15 +41,16 @@ class Rosbag {
   void finish(const std::optional<log_header_t>& header, const std::string& log);
 
   // Of the attachment, and of a topic's metadata: the bus's channel whose messages it says in full.
-  static constexpr const char* kRest = "run.lcm";
+  static constexpr const char* kRest = "run.lcm.zst";
+  static constexpr const char* kPlainRest = "run.lcm";  // in the bags of earlier versions
   static constexpr const char* kChannel = "ruedo_channel";
   // Of a bag's attachments: each is a file again while the bag is shown.
   static constexpr uint64_t kMostAttachedBytes = uint64_t{16} << 30;
   static constexpr size_t kMostAttachments = 10'001;  // the files of a log's header, and kRest
 
   uint64_t messages() const { return out_->messages(); }
-  // Bytes of the bag, with those of the rest that is attached at its end.
-  uint64_t size() const { return out_->size() + static_cast<uint64_t>(rest_->size()); }
+  // Bytes of the bag, with those of the rest that is attached at its end: packed for this.
+  uint64_t find_size();
   uint64_t left_out() const { return left_out_; }
 
  private:
@@ -68,6 +69,8 @@ class Rosbag {
   bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
   void attach_files(log_header_t header, const std::string& log);
   void require_room(uint64_t attached_bytes) const;
+  std::string packed_rest_file() const { return rest_file_ + ".zst"; }
+  void pack_rest();  // into packed_rest_file()
   std::string metadata() const;
 
   std::string folder_, file_, rest_file_;
