@@ -182,6 +182,18 @@ btScalar ahead_of(const btCollisionObject& a, const btCollisionObject& b, btScal
   return std::max(kSeenAhead_m, (speed + fall) * substep_s);
 }
 
+// Margins and enlarged boxes lead to contacts farther away than shapes are seen ahead, by less.
+constexpr btScalar kSeenBeyond_m = 3e-3;
+
+// Within what distance contacts are found: of planes and meshes, all that Bullet keeps.
+btScalar reach_of(const btCollisionObject& a, const btCollisionObject& b, btScalar ahead) {
+  const auto is_solid = [](const btCollisionObject& object) {
+    const btCollisionShape& shape = *object.getCollisionShape();
+    return shape.isConvex() || (shape.isCompound() && !object.isStaticObject());
+  };
+  return is_solid(a) && is_solid(b) ? ahead + kSeenBeyond_m : std::max(kReach_m, ahead);
+}
+
 // Whether their boxes are farther apart than that.
 bool apart(const btCollisionObject& a, const btCollisionObject& b, btScalar by) {
   btVector3 low_a, high_a, low_b, high_b;
@@ -190,6 +202,12 @@ bool apart(const btCollisionObject& a, const btCollisionObject& b, btScalar by) 
   btVector3 gap = low_a - high_b;
   gap.setMax(low_b - high_a);
   return gap[gap.maxAxis()] > by;
+}
+
+void forget_contacts(btCollisionAlgorithm& algorithm, btManifoldArray& manifolds) {
+  manifolds.resizeNoInitialize(0);
+  algorithm.getAllContactManifolds(manifolds);
+  for (int i = 0; i < manifolds.size(); ++i) manifolds[i]->clearManifold();
 }
 
 void see_ahead(btCollisionObject& object, btScalar by) {
@@ -418,11 +436,13 @@ void collide(btBroadphasePair& pair, btDispatcher& dispatcher, const btDispatche
   const btCollisionObjectWrapper of_b(nullptr, b.getCollisionShape(), &b, b.getWorldTransform(), -1,
                                       -1);
   const btScalar ahead = ahead_of(a, b, info.m_timeStep);
-  if (!pair.m_algorithm) {
-    // The broad phase's pairs are those within decimetres: of small things, all.
-    if (!is_driven(a) && !is_driven(b) && apart(a, b, std::max(kReach_m, ahead))) return;
-    pair.m_algorithm = dispatcher.findAlgorithm(&of_a, &of_b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+  // The broad phase's pairs are those within decimetres: of small things, all.
+  if (!is_driven(a) && !is_driven(b) && apart(a, b, reach_of(a, b, ahead))) {
+    if (pair.m_algorithm) forget_contacts(*pair.m_algorithm, scratch.manifolds);
+    return;
   }
+  if (!pair.m_algorithm)
+    pair.m_algorithm = dispatcher.findAlgorithm(&of_a, &of_b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
   if (!pair.m_algorithm) return;
   scratch.substep_s = info.m_timeStep;
   seen_ahead_m = ahead;
