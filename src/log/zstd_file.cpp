@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <memory>
 #include <vector>
 
@@ -13,38 +12,12 @@
 
 #include "base/input_file.h"
 #include "ruedo/errors.h"
+#include "system/output_file.h"
 
 namespace ruedo::log {
 namespace {
 
 constexpr int kLevel = 1;  // as a bag's chunks
-
-// A file that is written from its beginning.
-class Output {
- public:
-  explicit Output(const std::string& path) : path_(path), file_(path, std::ios::binary) {}
-
-  void write(const std::vector<char>& bytes, size_t count) {
-    file_.write(bytes.data(), static_cast<std::streamsize>(count));
-    if (!file_) fail();
-    size_ += count;
-  }
-  uint64_t close() {
-    file_.close();
-    if (!file_) fail();
-    return size_;
-  }
-  uint64_t size() const { return size_; }
-
- private:
-  [[noreturn]] void fail() const {
-    throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
-  }
-
-  std::string path_;
-  std::ofstream file_;
-  uint64_t size_ = 0;
-};
 
 // The next part of at most `left` bytes.
 ZSTD_inBuffer read_part(const InputFile& in, const std::string& path, std::vector<char>& part,
@@ -65,7 +38,7 @@ void pack_file(const std::string& from, const std::string& to) {
   const std::unique_ptr<ZSTD_CCtx, Free> context(ZSTD_createCCtx());
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
   const InputFile in = open_input(from);
-  Output out(to);
+  OutputFile out(to);
   std::vector<char> part(ZSTD_CStreamInSize()), packed(ZSTD_CStreamOutSize());
   auto left = static_cast<uint64_t>(in.size);
   bool more = true;
@@ -77,11 +50,11 @@ void pack_file(const std::string& from, const std::string& to) {
       const size_t rest = ZSTD_compressStream2(context.get(), &output, &input, directive);
       if (ZSTD_isError(rest))
         throw EnvironmentError(std::string("zstd: ") + ZSTD_getErrorName(rest));
-      out.write(packed, output.pos);
+      out.write({packed.data(), output.pos});
       more = left > 0 || rest > 0;
     } while (directive == ZSTD_e_end ? more : input.pos < input.size);
   }
-  out.close();
+  out.keep();
 }
 
 uint64_t unpack_part(const std::string& from, uint64_t offset, uint64_t size, const std::string& to,
@@ -93,9 +66,10 @@ uint64_t unpack_part(const std::string& from, uint64_t offset, uint64_t size, co
   const InputFile in = open_input(from);
   if (::fseeko(in.file.get(), static_cast<off_t>(offset), SEEK_SET) != 0)
     throw InputError({from}, "cannot be read: " + std::string(std::strerror(errno)));
-  Output out(to);
+  OutputFile out(to);
   std::vector<char> part(ZSTD_DStreamInSize()), unpacked(ZSTD_DStreamOutSize());
   size_t wanted = 1;  // 0 at a frame's end
+  uint64_t written = 0;
   for (uint64_t left = size; left > 0;) {
     ZSTD_inBuffer input = read_part(in, from, part, left);
     bool full = false;  // then zstd may hold more of what it has read
@@ -104,14 +78,16 @@ uint64_t unpack_part(const std::string& from, uint64_t offset, uint64_t size, co
       wanted = ZSTD_decompressStream(context.get(), &output, &input);
       if (ZSTD_isError(wanted))
         throw InputError({from}, "has an attachment that is not what was written (zstd)");
-      if (output.pos > max_bytes - out.size())
+      if (output.pos > max_bytes - written)
         throw InputError({from}, fmt::format("has an attachment of more than {} bytes", max_bytes));
-      out.write(unpacked, output.pos);
+      out.write({unpacked.data(), output.pos});
+      written += output.pos;
       full = output.pos == output.size;
     }
   }
   if (wanted != 0) throw InputError({from}, "has an attachment that is cut off (zstd)");
-  return out.close();
+  out.keep();
+  return written;
 }
 
 }  // namespace ruedo::log

@@ -51,7 +51,7 @@ TEST_F(ZstdFile, EndsWhereItIsLargerThanAllowed) {
   pack_file(path("plain"), path("packed"));
   const uint64_t size = std::filesystem::file_size(path("packed"));
   EXPECT_THROW(unpack_part(path("packed"), 0, size, path("again"), 999'999), InputError);
-  EXPECT_LT(std::filesystem::file_size(path("again")), 1'000'000);
+  EXPECT_FALSE(std::filesystem::exists(path("again")));
   EXPECT_EQ(unpack_part(path("packed"), 0, size, path("again"), 1'000'000), 1'000'000);
 }
 
