@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # try_deb_in_debian.sh FOLDER DEB SUITE: installs, tries and removes Ruedo's Debian package in a bare Debian of that suite, made by
-# debootstrap in FOLDER/SUITE. What runs, runs as an ordinary user, without GPU and display, and without a network but for apt's. Prints
-# what happens; fails when something does not work, or something is left. Wants root.
+# debootstrap in FOLDER/SUITE-ARCH. What runs, runs as an ordinary user, without GPU and display, and without a network but for apt's. Prints
+# what happens; fails when something does not work, or something is left. Wants root. That for aarch64: by scripts/on_arm64 --root.
 #
 # First as the Containerfile has it, with nothing else there: server, camera, ROS 2, Python. Then with a compiler, CMake and a JDK: C++ and
 # Java. Then it is purged.
@@ -9,10 +9,11 @@
 set -euo pipefail
 folder=$(realpath "$1") deb=$(realpath "$2") suite=$3
 here=$(dirname "$(realpath "$0")")
-root=$folder/$suite
+arch=$(dpkg-deb -f "$deb" Architecture)
+root=$folder/$suite-$arch
 
 if [[ ! -e $root/etc/debian_version ]]; then
-  debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" >"$folder/$suite.log"
+  debootstrap --arch "$arch" --variant=minbase --include=ca-certificates "$suite" "$root" >"$folder/$suite.log"
 fi
 # apt in there uses the same package sources as here.
 cp /etc/resolv.conf "$root/etc/resolv.conf"

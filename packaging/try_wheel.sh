@@ -49,7 +49,9 @@ rm -rf other
 engine=true
 venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 11))' || engine=false
 if $engine; then
-  venv/bin/python "$source/tests/golden/wheel_runs.py" | diff "$source/tests/golden/hashes.txt" -
+  runs=(arena fleet bases wheels arms meshes camera)
+  [[ $(uname -m) != aarch64 ]] || runs=(arena fleet bases arms)    # pictures differ there: docs/platforms.md
+  venv/bin/python "$source/tests/golden/wheel_runs.py" "${runs[@]}" | diff <(grep -E "^($(IFS='|' && echo "${runs[*]}")) " "$source/tests/golden/hashes.txt") -
 else
   venv/bin/python -c 'import ruedo
 try: ruedo.Engine("arena")

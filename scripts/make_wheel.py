@@ -10,7 +10,8 @@ and the Python client at once, so that the program, importer, worlds, C++ packag
 by the paths between them. auditwheel copies the shared libraries that a bare Debian 12 does not
 have into ruedo.libs. The module that runs a world in a Python process is there for the build's own
 Python and, where the headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on.
-Twice the same build gives twice the same bytes.
+Twice the same build gives twice the same bytes. A build of the preset arm64 gives wheels for
+aarch64.
 """
 
 import base64
@@ -28,8 +29,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "packaging"))
 
 import parts  # noqa: E402
+from auditwheel import lddtree  # noqa: E402
 
-PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
+PLATFORM = "manylinux_2_36"  # Debian 12's C library
 # Libraries that Debian's libraries are linked to and nothing here calls, by the linked one: most
 # of them some 10 MB.
 UNUSED = {
@@ -41,6 +43,8 @@ UNUSED = {
 }
 # Libraries that the platform's tag presumes, and a bare Debian lacks.
 NOT_THERE = ("libglib-2.0",)
+# Its command line knows the platforms of the machine that it runs on, otherwise it takes all.
+AUDITWHEEL = "import auditwheel.main, platform, sys; platform.machine = lambda: '{}'; sys.exit(auditwheel.main.main())"
 BYTES_EPOCH = (2020, 1, 1, 0, 0, 0)
 SCRIPT = '''#!python
 import importlib.util, os, sys
@@ -59,6 +63,32 @@ def run(*command: object, **options) -> str:
     ).stdout
 
 
+class Target:
+    """What a build is for."""
+
+    def __init__(self, build: Path):
+        cache = (build / "CMakeCache.txt").read_text(encoding="utf-8")
+        self.is_other = bool(
+            re.search(r"^CMAKE_TOOLCHAIN_FILE:.*/arm64\.cmake$", cache, re.MULTILINE)
+        )
+        self.machine = "aarch64" if self.is_other else os.uname().machine
+        self.platform = f"{PLATFORM}_{self.machine}"
+
+    def library_paths(self) -> str | None:
+        """Where its shared libraries are; None: where this system's loader says."""
+        root = ROOT / "build/sysroot-arm64"
+        folders = ("usr/lib/aarch64-linux-gnu", "lib/aarch64-linux-gnu")
+        return ":".join(str(root / folder) for folder in folders) if self.is_other else None
+
+    def use_tools(self, folder: Path) -> None:
+        """Puts the compiler and binutils of the target first on the PATH."""
+        folder.mkdir()
+        for name in ("gcc", "nm", "strip") if self.is_other else ():
+            found = shutil.which(f"{self.machine}-linux-gnu-{name}")
+            (folder / name).symlink_to(found or sys.exit(f"no {name} for {self.machine} here"))
+        os.environ["PATH"] = f"{folder}:{os.environ['PATH']}"
+
+
 def symbols(library: Path, which: str) -> set[str]:
     """Of the dynamic symbols, --defined-only or --undefined-only, each with its version:
     "xmlFree@LIBXML2_2.4.30".
@@ -68,17 +98,18 @@ def symbols(library: Path, which: str) -> set[str]:
     }
 
 
-def resolved(package: Path) -> dict[str, Path]:
+def resolved(package: Path, target: Target) -> dict[str, Path]:
     """{soname: file} of all that the program loads, at its start or later."""
-    files = [package / "bin/ruedo", *package.glob("lib/**/libruedo_*.so")]
-    return {
-        name: Path(path).resolve()
-        for file in files
-        for name, path in re.findall(r"(\S+) => (/\S+)", run("ldd", file))
-    }
+    found = {}
+    for file in (package / "bin/ruedo", *package.glob("lib/**/libruedo_*.so")):
+        tree = lddtree.ldd(file, ldpaths=lddtree.ld_paths_from_arg(target.library_paths()))
+        for name, library in tree.libraries.items():
+            if library.realpath:
+                found[name] = Path(library.realpath)
+    return found
 
 
-def make_stub(soname: str, names: set[str], folder: Path) -> None:
+def make_stub(soname: str, names: set[str], folder: Path, machine: str) -> None:
     """A library of that name in which each function returns 0."""
     versions: dict[str, list[str]] = {}
     for name in sorted(names):
@@ -94,7 +125,7 @@ def make_stub(soname: str, names: set[str], folder: Path) -> None:
         for found in versions.values()
         for name in found
     )
-    returns = "xor %eax, %eax\nret\n" if os.uname().machine == "x86_64" else "mov x0, #0\nret\n"
+    returns = "xor %eax, %eax\nret\n" if machine == "x86_64" else "mov x0, #0\nret\n"
     run(
         "gcc",
         "-shared",
@@ -110,15 +141,16 @@ def make_stub(soname: str, names: set[str], folder: Path) -> None:
     )
 
 
-def stub_unused(package: Path, folder: Path) -> None:
+def stub_unused(package: Path, folder: Path, target: Target) -> None:
     """For what UNUSED says, libraries in `folder` that take the place of the real ones."""
-    libraries = resolved(package)
+    libraries = resolved(package, target)
     folder.mkdir()
     for start, ends in UNUSED.items():
         for user in (path for soname, path in libraries.items() if soname.startswith(start)):
             wanted = symbols(user, "--undefined-only")
             for soname in (name for name in libraries if name.startswith(tuple(ends))):
-                make_stub(soname, wanted & symbols(libraries[soname], "--defined-only"), folder)
+                found = wanted & symbols(libraries[soname], "--defined-only")
+                make_stub(soname, found, folder, target.machine)
 
 
 def add_licences(tree: Path) -> None:
@@ -155,7 +187,7 @@ def add_licences(tree: Path) -> None:
             shutil.copy(text, folder / package)
 
 
-def stage(build: Path, tree: Path) -> str:
+def stage(build: Path, tree: Path, target: Target) -> str:
     """The installation as the package; gives the version."""
     prefix = tree / "installed"
     run("cmake", "--install", build, "--prefix", prefix)
@@ -170,7 +202,7 @@ def stage(build: Path, tree: Path) -> str:
     libraries = next((package / "lib").glob("**/liblcm.so.1")).parent
     for engine in package.glob("_engine*.so"):
         run("patchelf", "--set-rpath", f"$ORIGIN/{libraries.relative_to(package)}", engine)
-    for soname, path in resolved(package).items():
+    for soname, path in resolved(package, target).items():
         if soname.startswith(NOT_THERE):
             shutil.copy(path, libraries / soname)
     run("patchelf", "--set-rpath", "$ORIGIN", libraries / "liblcm.so.1")
@@ -357,18 +389,23 @@ def main(build: Path, out: Path, level: int) -> list[Path]:
     os.environ["PATH"] = f"{tools}:{os.environ['PATH']}"  # auditwheel starts patchelf
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="ruedo-wheel-") as folder:
-        tree = Path(folder)
-        version = stage(build, tree)
-        describe(build, tree / "wheel", "ruedo", version, f"py3-none-linux_{os.uname().machine}")
-        raw = tree / f"ruedo-{version}-py3-none-linux_{os.uname().machine}.whl"
+        tree, target = Path(folder), Target(build)
+        target.use_tools(tree / "tools")
+        version = stage(build, tree, target)
+        describe(build, tree / "wheel", "ruedo", version, f"py3-none-linux_{target.machine}")
+        raw = tree / f"ruedo-{version}-py3-none-linux_{target.machine}.whl"
         pack(tree / "wheel", raw, 0)
         stubs = tree / "stubs"
-        stub_unused(tree / "wheel/ruedo", stubs)
+        stub_unused(tree / "wheel/ruedo", stubs, target)
+        paths = target.library_paths()
         run(
-            tools / "auditwheel",
+            sys.executable,
+            "-c",
+            AUDITWHEEL.format(target.machine),
             "repair",
             "--plat",
-            PLATFORM,
+            target.platform,
+            *(("--ldpaths", f"{stubs}:{paths}") if paths else ()),
             "-z",
             1,
             "--wheel-dir",
@@ -386,11 +423,11 @@ def main(build: Path, out: Path, level: int) -> list[Path]:
             (tree / name).mkdir()
         split(tree / "final", tree / "client", tree / "camera")
         describe(build, tree / "client", "ruedo-client", version, "py3-none-any")
-        describe(build, tree / "camera", "ruedo-camera", version, f"py3-none-{PLATFORM}")
+        describe(build, tree / "camera", "ruedo-camera", version, f"py3-none-{target.platform}")
         made = {
             "final": repaired.name,
             "client": f"ruedo_client-{version}-py3-none-any.whl",
-            "camera": f"ruedo_camera-{version}-py3-none-{PLATFORM}.whl",
+            "camera": f"ruedo_camera-{version}-py3-none-{target.platform}.whl",
         }
         for name, file in made.items():
             add_licences(tree / name)

@@ -58,7 +58,7 @@ NOT_RUN = {
     ("platforms.md", "packaging/try_in_debian.sh"): "tests/package/test_debian.py",
     ("platforms.md", "mvn"): "tests/package/test_maven.py",
     ("platforms.md", "python3 -m venv"): INSTALLS,
-    ("platforms.md", "scripts/sysroot"): "scripts/test --nightly does it, for golden.aarch64",
+    ("platforms.md", "RUEDO_ARCH"): "the packages for aarch64, in an emulator: by hand",
     ("platforms.md", "scripts/release"): "needs podman, and its images from elsewhere",
     ("plugins.md", "find_package"): "the core of docs/example-plugin: tests/package/test_plugin.py",
     ("plugins.md", "<ruedo:drive"): "part of docs/example-plugin: tests/package/test_plugin.py",
