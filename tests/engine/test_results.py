@@ -17,7 +17,7 @@ sys.path.insert(0, str(LEARNERS))
 import replay
 import results
 
-POLICIES = sorted((LEARNERS / "results").glob("*.npz"))
+POLICIES = sorted((LEARNERS / "results").glob("*/*.npz"))
 
 
 @pytest.mark.parametrize("file", POLICIES, ids=lambda file: file.stem)

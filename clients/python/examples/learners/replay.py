@@ -1,6 +1,6 @@
 """Trained policies, replayed with NumPy alone: what results.py keeps of each run.
 
-python replay.py results/Reach-v0-ppo-1.npz [--episodes 100]
+python replay.py results/Reach-v0/Reach-v0-ppo-1.npz [--episodes 100]
 """
 
 from __future__ import annotations

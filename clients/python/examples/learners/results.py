@@ -58,14 +58,15 @@ COLUMNS = ["steps", "cpu_s", "episodes", "success", "return"]
 
 
 class Run:
-    """One run, in files that begin with its name."""
+    """One run, in files that begin with its name, in its task's folder."""
 
     def __init__(self, out: Path, task: str, algorithm: str, seed: int):
         self.task, self.algorithm, self.seed = task, algorithm, seed
         self.name = f"{task}-{algorithm}-{seed}"
-        self.curve, self.policy = out / f"{self.name}.csv", out / f"{self.name}.npz"
-        self.record = out / f"{self.name}.json"
-        self.model, self.buffer = out / f"{self.name}.zip", out / f"{self.name}.pkl"
+        files = out / task / self.name
+        self.curve, self.policy, self.record, self.model, self.buffer = (
+            files.with_suffix(suffix) for suffix in (".csv", ".npz", ".json", ".zip", ".pkl")
+        )
 
     def rows(self) -> list[dict[str, float]]:
         if not self.curve.exists():
@@ -86,6 +87,7 @@ class Run:
         from replay import success_rate
 
         torch.set_num_threads(1)
+        self.curve.parent.mkdir(parents=True, exist_ok=True)
         rows = self.rows() if self.model.exists() else []
         model, envs = self._begin(bool(rows))
         spent = rows[-1]["cpu_s"] if rows else 0.0
@@ -212,6 +214,7 @@ def plot(runs: list[Run], file: Path) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "ruedo"  # twice the same, twice the same file
     import matplotlib.pyplot as plt
 
     groups = _groups(runs)
