@@ -7,12 +7,15 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kSlack_m = 0.05;
 constexpr size_t kPartners = 8,
                  kFound = 64;  // capacity reserved for results: no allocation in the running loop
 
-btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
+// By half its longest side, at most 5 cm.
+btDbvtVolume widened(const btVector3& low, const btVector3& high) {
+  constexpr double kMost_m = 0.05;
   btDbvtVolume volume = btDbvtVolume::FromMM(low, high);
+  const btVector3 half = volume.Extents();
+  const double by = std::min(half[half.maxAxis()], kMost_m);
   volume.Expand({by, by, by});
   return volume;
 }
@@ -59,7 +62,7 @@ btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3
     return &proxy;
   }
   proxy.leaf = proxy.moves
-                   ? moving_.insert(widened(proxy.m_aabbMin, proxy.m_aabbMax, kSlack_m), &proxy)
+                   ? moving_.insert(widened(proxy.m_aabbMin, proxy.m_aabbMax), &proxy)
                    : fixed_.insert(btDbvtVolume::FromMM(proxy.m_aabbMin, proxy.m_aabbMax), &proxy);
   if (proxy.moves) find_pairs(proxy, dispatcher);
   return &proxy;
@@ -79,7 +82,7 @@ void Broadphase::setAabb(btBroadphaseProxy* base, const btVector3& low, const bt
   proxy.m_aabbMin = low;
   proxy.m_aabbMax = high;
   if (!proxy.moves || proxy.leaf->volume.Contain(btDbvtVolume::FromMM(low, high))) return;
-  btDbvtVolume volume = widened(low, high, kSlack_m);
+  btDbvtVolume volume = widened(low, high);
   moving_.update(proxy.leaf, volume);
   find_pairs(proxy, dispatcher);
 }

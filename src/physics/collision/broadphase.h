@@ -63,7 +63,7 @@ class Broadphase final : public btBroadphaseInterface {
   void exchange(StateArchive& archive, btDispatcher* dispatcher);
 
   // The btBroadphaseInterface. Objects of the static filter group never move; the boxes of others
-  // are enlarged by kSlack_m, so that few of their moves update the trees.
+  // are enlarged, so that few of their moves update the trees.
   btBroadphaseProxy* createProxy(const btVector3& low, const btVector3& high, int shape_type,
                                  void* object, int group, int mask,
                                  btDispatcher* dispatcher) override;
