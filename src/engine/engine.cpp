@@ -416,14 +416,16 @@ void Engine::step(int64_t steps, std::span<const uint8_t> which,
   }
 }
 
-void Engine::drive(std::span<const double> velocities) {
+void Engine::drive(std::span<const double> velocities, std::span<const uint8_t> which) {
   const size_t rows = copies_.size() * velocity_inputs_.size();
   if (velocities.size() != 3 * rows)
     throw InputError({}, "velocities are " + std::to_string(rows) +
                              " rows of 3, one for each driven robot of each world");
+  if (std::any_of(velocities.begin(), velocities.end(), [](double v) { return std::isinf(v); }))
+    throw InputError({}, "commands are finite numbers, or NaN for none; one is infinite");
   for (size_t i = 0; i < copies_.size(); ++i) take_velocities(i);  // from an earlier call
   velocities_.assign(velocities.begin(), velocities.end());
-  for (auto& copy : copies_) copy->driven = true;
+  for (size_t i = 0; i < copies_.size(); ++i) copies_[i]->driven = which.empty() || which[i];
 }
 
 // Moves what drive() was given into the copy's inbox: in the thread that computes the copy.

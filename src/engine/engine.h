@@ -73,8 +73,8 @@ class Engine {
 
   // A velocity for every driven robot of every copy, acting on the current states: copies x driven
   // robots x (m/s forward, m/s left, rad/s), row-major. A row with a NaN gives no command: the
-  // previous command stays in force.
-  void drive(std::span<const double> velocities);
+  // previous command stays in force; and so do those of copies that `which` leaves out.
+  void drive(std::span<const double> velocities, std::span<const uint8_t> which = {});
 
   // A message as on the bus, acting on the current state. Throws InputError for a channel that
   // takes no commands, or invalid bytes.

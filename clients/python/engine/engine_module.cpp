@@ -41,6 +41,13 @@ using ruedo::engine::SavedWorld;
 
 namespace {
 
+// Of copies, 0 or 1 for each; none: all.
+using Mask = std::optional<nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>>;
+
+std::span<const uint8_t> span_of(const Mask& mask) {
+  return mask ? std::span(mask->data(), mask->size()) : std::span<const uint8_t>();
+}
+
 // A view of the engine's own memory, which stays as long as any view of it, and is written by
 // step() and reset().
 nb::object view_of(std::shared_ptr<const FieldArray> array) {
@@ -126,25 +133,23 @@ class PyEngine {
     engine_.reset();
   }
 
-  void step(int64_t steps,
-            const std::optional<nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>>& which) {
+  void step(int64_t steps, const Mask& which) {
     Engine& engine = this->engine();
     recorded_.clear();
     bool interrupted = false;
     {
       const AtWork at_work(*this);
-      engine.step(steps,
-                  which ? std::span(which->data(), which->size()) : std::span<const uint8_t>(),
-                  [&interrupted] {
-                    interrupted = interrupts();
-                    return !interrupted;
-                  });
+      engine.step(steps, span_of(which), [&interrupted] {
+        interrupted = interrupts();
+        return !interrupted;
+      });
     }
     if (interrupted) throw nb::python_error();  // what a signal's handler raised
   }
 
-  void drive(const nb::ndarray<const double, nb::c_contig, nb::device::cpu>& velocities) {
-    engine().drive({velocities.data(), velocities.size()});
+  void drive(const nb::ndarray<const double, nb::c_contig, nb::device::cpu>& velocities,
+             const Mask& which) {
+    engine().drive({velocities.data(), velocities.size()}, span_of(which));
   }
 
   void command(int world, const std::string& channel, const nb::bytes& message) {
@@ -374,7 +379,7 @@ NB_MODULE(_engine, module) {
            nb::arg("allow_errors") = false, nb::arg("allow_absolute") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step, nb::arg("steps"), nb::arg("which") = nb::none())
-      .def("drive", &PyEngine::drive)
+      .def("drive", &PyEngine::drive, nb::arg("velocities"), nb::arg("which") = nb::none())
       .def("command", &PyEngine::command)
       .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"),
            nb::arg("texts") = nb::list())

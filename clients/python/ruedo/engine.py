@@ -337,10 +337,7 @@ class Engine:
                 )
             which = np.ascontiguousarray(mask).view(np.uint8)
         if commands is not None:
-            rows = self._velocities(commands)
-            if which is not None:
-                rows[which == 0] = np.nan
-            self._core.drive(rows)
+            self._core.drive(self._velocities(commands), which)
         self._core.step(count, which)
 
     def command(self, world: int, channel: str, message: Any) -> None:
@@ -476,26 +473,21 @@ class Engine:
 
     def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
         given = array("commands are numbers, (m/s, rad/s) for each robot of each world", commands)
-        if np.isinf(given).any():
-            raise ValueError("commands are finite numbers, or NaN for none; one is infinite")
         if given.ndim == 0 or given.shape[-1] not in (2, 3):
             raise ValueError(
                 f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
                 f"their shape is {given.shape}"
             )
-        shape = (self._worlds, len(self._robots), given.shape[-1])
+        values = given.shape[-1]
+        shape = (self._worlds, len(self._robots), values)
+        rows = np.zeros((*shape[:2], 3))
         try:
-            rows = given if given.shape == shape else np.broadcast_to(given, shape)
+            rows[..., :: 4 - values] = given  # of two: m/s ahead and rad/s
         except ValueError:
             raise ValueError(
-                f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}"
+                f"commands of shape {given.shape} do not fit (worlds, robots, {values}) = {shape}"
             ) from None
-        if shape[2] == 3:
-            return np.array(rows)
-        full = np.zeros((*shape[:2], 3))
-        full[..., 0] = rows[..., 0]
-        full[..., 2] = rows[..., 1]
-        return full
+        return rows
 
     def _checked(self, world: int) -> int:
         index = whole("a world's index", world, -MOST_WHOLE)
