@@ -75,6 +75,20 @@ double contact_reach_m(const Vec3& half, const Vec3& angular, double step_s) {
   return std::min(kLeast_m + kOfSize * 2.0 * half.maxCoeff() + turns_m, kContactReach_m);
 }
 
+// rad/s at which the body's shape turns: not a ball's, and not a cylinder's about its axis.
+double turning_of(const RigidBody& rigid, const Vec3& angular) {
+  if (rigid.compound->getNumChildShapes() != 1) return angular.norm();
+  const btTransform& X_IC = rigid.compound->getChildTransform(0);
+  const btVector3 off = X_IC.getOrigin(), axis = X_IC.getBasis().getColumn(2);
+  switch (rigid.compound->getChildShape(0)->getShapeType()) {
+    case SPHERE_SHAPE_PROXYTYPE: return off.fuzzyZero() ? 0.0 : angular.norm();
+    case CYLINDER_SHAPE_PROXYTYPE:
+      if (!off.cross(axis).fuzzyZero()) return angular.norm();
+      return angular.cross(from_bt(rigid.bullet->getWorldTransform().getBasis() * axis)).norm();
+    default: return angular.norm();
+  }
+}
+
 }  // namespace
 
 bool MayTouch::may_touch(const btCollisionObject& object_a,
@@ -521,7 +535,7 @@ void PhysicsWorld::Impl::find_fast() {
     const double way =
         twists_[i].linear.norm() + from_bt(rigid.bullet->getGravity()).norm() * substep_s;
     if (way * substep_s > kFarthest * rigid.box_half.minCoeff() ||
-        twists_[i].angular.norm() * substep_s > kFarthest_rad)
+        turning_of(rigid, twists_[i].angular) * substep_s > kFarthest_rad)
       motions_[root(i)].fine = true;
   }
 }

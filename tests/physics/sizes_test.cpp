@@ -227,6 +227,26 @@ TEST_F(Sizes, APlacedBodyStands) {
 }
 
 // A lying capsule, cylinder or round mesh has no reason to roll.
+// Its shape turns far in a step and stays where it was: neither its way nor its energy change.
+TEST_F(Sizes, WhatRollsFastRollsOn) {
+  constexpr double kRate_rad_s = 80.0;
+  for (const double r : {2e-3, 5e-3, 0.05, 0.5}) {
+    for (const Thing& thing : {ball(r, 1000), cylinder(r, 3 * r, 1000)}) {
+      for (const int64_t step_us : {1000, 5000, 10'000}) {
+        const double v = kRate_rad_s * r;
+        World w(kPlane + placed("t", text({0, 0, r, M_PI / 2, 0, 0}), thing, 0.5), step_us);
+        w.physics.set_twist(w.body("t/l"), {{v, 0, 0}, {0, kRate_rad_s, 0}});
+        const double energy = energy_of(w, thing, 9.8);
+        w.run(1.0);
+        const std::string what = thing.geometry + text({1e-3 * static_cast<double>(step_us)});
+        EXPECT_NEAR(w.position("t/l").x(), v, 1e-3 * v) << what;
+        EXPECT_NEAR(w.position("t/l").y(), 0.0, 1e-3 * v) << what;
+        EXPECT_NEAR(energy_of(w, thing, 9.8), energy, 1e-3 * energy) << what;
+      }
+    }
+  }
+}
+
 TEST_F(Sizes, ALyingBodyStays) {
   for (const int64_t step_us : {1000, 5000, 20'000}) {
     for (const double s : {0.002, 0.02, 0.2, 2.0}) {
