@@ -6,47 +6,47 @@
 
 #include <gtest/gtest.h>
 
-#include "physics/base/envelope.h"
+#include "physics/base/sparse_matrix.h"
 #include "physics/base/newton.h"
 #include "physics/base/reduced_matrix.h"
 
 namespace ruedo::physics {
 namespace {
 
-TEST(Envelope, SolvesLikeADenseFactor) {
+TEST(SparseMatrix, SolvesLikeADenseFactor) {
   constexpr int kBodies = 7;
   const std::vector<std::pair<int, int>> pairs = {{1, 2}, {2, 5}, {5, 3}, {3, 6}, {6, 1}, {0, 4}};
   std::vector<char> takes_part(kBodies, 1);
   takes_part[0] = 0;
-  Envelope envelope;
-  envelope.prepare(takes_part, pairs);
-  ASSERT_EQ(envelope.size(), 6u);
+  SparseMatrix matrix;
+  matrix.prepare(takes_part, pairs);
+  ASSERT_EQ(matrix.size(), 6u);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   Eigen::MatrixXd dense = Eigen::MatrixXd::Identity(36, 36);
-  envelope.set_identity();
+  matrix.set_identity();
   for (const auto& [a, b] : pairs) {
-    const PlaceIndex p = envelope.place(a), q = envelope.place(b);
+    const PlaceIndex p = matrix.place(a), q = matrix.place(b);
     if (!p.valid() || !q.valid()) continue;
-    const Envelope::Block A = Envelope::Block::NullaryExpr([&] { return any(random); }),
-                          B = Envelope::Block::NullaryExpr([&] { return any(random); });
-    envelope.block(p, p) += A * A.transpose();
-    envelope.block(q, q) += B * B.transpose();
-    envelope.block(std::max(p, q), std::min(p, q)) +=
-        p > q ? Envelope::Block(A * B.transpose()) : Envelope::Block(B * A.transpose());
+    const SparseMatrix::Block A = SparseMatrix::Block::NullaryExpr([&] { return any(random); }),
+                          B = SparseMatrix::Block::NullaryExpr([&] { return any(random); });
+    matrix.block(p, p) += A * A.transpose();
+    matrix.block(q, q) += B * B.transpose();
+    matrix.block(std::max(p, q), std::min(p, q)) +=
+        p > q ? SparseMatrix::Block(A * B.transpose()) : SparseMatrix::Block(B * A.transpose());
     dense.block<6, 6>(6 * p, 6 * p) += A * A.transpose();
     dense.block<6, 6>(6 * q, 6 * q) += B * B.transpose();
     dense.block<6, 6>(6 * p, 6 * q) += A * B.transpose();
     dense.block<6, 6>(6 * q, 6 * p) += B * A.transpose();
   }
-  std::vector<Envelope::Six> x(6);
+  std::vector<SparseMatrix::Six> x(6);
   Eigen::VectorXd right(36);
   for (int i = 0; i < 6; ++i) {
-    x[i] = Envelope::Six::NullaryExpr([&] { return any(random); });
+    x[i] = SparseMatrix::Six::NullaryExpr([&] { return any(random); });
     right.segment<6>(6 * i) = x[i];
   }
-  envelope.factor();
-  envelope.solve(x);
+  matrix.factor();
+  matrix.solve(x);
   const Eigen::VectorXd expected = dense.llt().solve(right);
   for (int i = 0; i < 6; ++i) EXPECT_LT((x[i] - expected.segment<6>(6 * i)).norm(), 1e-12);
 }

@@ -75,8 +75,8 @@ void Newton::set_bodies(const SolverBodies& bodies) {
 
 double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs) {
   set_bodies(bodies);
-  matrix_ = &envelope_;
-  return envelope_.prepare(movable_, pairs);
+  matrix_ = &sparse_;
+  return sparse_.prepare(movable_, pairs);
 }
 
 void Newton::begin_trees(const SolverBodies& bodies) {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "physics/base/envelope.h"
+#include "physics/base/sparse_matrix.h"
 #include "physics/base/reduced_matrix.h"
 #include "physics/base/rows.h"
 
@@ -54,8 +54,8 @@ class Newton {
   bool solve(SolverBodies& bodies, double tolerance, int most_steps);
 
  private:
-  using Six = Envelope::Six;
-  using Block = Envelope::Block;
+  using Six = SparseMatrix::Six;
+  using Block = SparseMatrix::Block;
   using Reach = Eigen::Matrix<double, 3, 6>;
   static constexpr size_t kNone = static_cast<size_t>(-1);
   struct Body {
@@ -135,9 +135,9 @@ class Newton {
 
   std::vector<Body> bodies_;  // as the solver's
   std::vector<char> movable_;
-  Envelope envelope_;
+  SparseMatrix sparse_;
   ReducedMatrix reduced_;
-  NewtonMatrix* matrix_ = &envelope_;
+  NewtonMatrix* matrix_ = &sparse_;
   std::vector<Six> y_, gradient_, step_, allowed_;  // by place, as L^-1 v
   std::vector<Bound> bounds_;
   std::vector<Contact> contacts_;
