@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "physics/base/sparse_matrix.h"
 #include "physics/base/reduced_matrix.h"
 #include "physics/base/rows.h"
+#include "physics/base/sparse_matrix.h"
 
 namespace ruedo::physics {
 
