@@ -228,7 +228,7 @@ TEST_F(Sizes, APlacedBodyStands) {
 
 // A lying capsule, cylinder or round mesh has no reason to roll.
 // Its shape turns far in a step and stays where it was: neither its way nor its energy change.
-TEST_F(Sizes, WhatRollsFastRollsOn) {
+TEST_F(Sizes, FastBallsAndCylindersKeepTheirSpeed) {
   constexpr double kRate_rad_s = 80.0;
   for (const double r : {2e-3, 5e-3, 0.05, 0.5}) {
     for (const Thing& thing : {ball(r, 1000), cylinder(r, 3 * r, 1000)}) {
