@@ -11,6 +11,9 @@ root=$folder/$suite
 if [[ ! -e $root/etc/debian_version ]]; then
   debootstrap --variant=minbase --include=ca-certificates,git "$suite" "$root" >"$folder/$suite.log"
 fi
+# debootstrap leaves out the updates of security, without which old libraries would go into the wheels.
+mirror=$(sed -n 's/^deb \(\[.*\] \)\?\([^ ]*\) .*/\2/p;q' "$root/etc/apt/sources.list")
+printf 'deb %s %s main\n' "$mirror" "$suite" "$mirror" "$suite-updates" "${mirror%/}-security" "$suite-security" >"$root/etc/apt/sources.list"
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 cp -r /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/"
 rm -f "$root"/etc/apt/apt.conf.d/docker-*
@@ -23,6 +26,6 @@ mount -t proc proc "$root/proc"
 rm -rf "$root/ruedo" "$root/out"
 git clone --quiet --no-hardlinks "$here/.." "$root/ruedo"
 chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive bash -euc \
-  'apt-get -q update >/dev/null; /ruedo/scripts/release "$@" /out' bash "$@"
+  'apt-get -q update >/dev/null; apt-get -q -y dist-upgrade >/dev/null; /ruedo/scripts/release "$@" /out' bash "$@"
 mkdir -p "$out"
 cp "$root"/out/* "$out"
