@@ -21,7 +21,7 @@ from simulators import Simulator, available, sdf, with_friction
 STEP_S, SECONDS, REPEATS = (
     0.005,
     1.5,
-    5,
+    9,
 )  # shorter than the 2 s after which Ruedo puts resting bodies to sleep
 
 

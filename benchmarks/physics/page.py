@@ -142,7 +142,7 @@ def plot(folder: Path, results: list[dict], key: str, label: str) -> str | None:
 
 COST = """## Cost
 
-The least CPU time of five runs of 1.5 s each, in one process, on one core, with a step of 5 ms. Ruedo's time includes its poses and channels. A moving mechanism takes substeps
+The least CPU time of nine runs of 1.5 s each, in one process, on one core, with a step of 5 ms. Ruedo's time includes its poses and channels. A moving mechanism takes substeps
 of 1 ms, unless motors drive all its joints, as here; in substeps of 1 ms the moving arm would cost about five times as much. MuJoCo's moving arm is not stable with its
 servo at 5 ms, which does not change its cost. A stack is solved until no velocity changes by more than 1e-5 m/s, which keeps the 15 boxes and the mass ratio of 100 in place: by sweeps, and
 if these do not converge soon, by Newton's method on all contacts at once. `solver/iters` and `<ruedo:tolerance>` trade accuracy for time. What has come to
