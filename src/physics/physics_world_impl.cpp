@@ -69,10 +69,12 @@ int near_shapes(const btCollisionObject& a, const btCollisionObject& b) {
 
 // How far from a body of that size its contacts are sought. Of small things in a heap, all would be
 // within the reach of large ones.
-double contact_reach_m(const Vec3& half, const Vec3& angular, double step_s) {
+double contact_reach_m(const RigidBody& rigid, const Vec3& angular, double step_s) {
   constexpr double kLeast_m = 3e-3, kOfSize = 0.25;
-  const double turns_m = angular.norm() * half.norm() * step_s;
-  return std::min(kLeast_m + kOfSize * 2.0 * half.maxCoeff() + turns_m, kContactReach_m);
+  const double size_m = 2.0 * rigid.box_half.maxCoeff();
+  const double turns_m =
+      angular.norm() * (rigid.box_center.norm() + rigid.box_half.norm()) * step_s;
+  return std::min(kLeast_m + kOfSize * size_m + turns_m, kContactReach_m);
 }
 
 // rad/s at which the body's shape turns: not a ball's, and not a cylinder's about its axis.
@@ -318,7 +320,7 @@ void PhysicsWorld::Impl::update_box(BodyIndex body) {
   if (!proxy || rigid.info.shapes.empty()) return;
   const BodyMotion& motion = motions_[body];
   const double step_s = static_cast<double>(step_us_) * 1e-6;
-  const double reach_m = contact_reach_m(rigid.box_half, twists_[body].angular, step_s);
+  const double reach_m = contact_reach_m(rigid, twists_[body].angular, step_s);
   const auto half_of = [&rigid, reach_m](const Pose& X) {
     return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half +
                 Vec3::Constant(reach_m));
