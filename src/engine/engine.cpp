@@ -508,10 +508,21 @@ std::unique_ptr<Engine::Copy> Engine::make_other(const Reset& reset) {
     return a.name == b.name && a.fingerprint == b.fingerprint;
   };
   const std::vector<Channel>&here = before.channels.list(), &there = copy->channels.list();
-  if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same))
+  if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same)) {
+    const auto found_in = [&](const std::vector<Channel>& channels, const Channel& one) {
+      return std::any_of(channels.begin(), channels.end(),
+                         [&](const Channel& other) { return same(one, other); });
+    };
+    std::string what = "its robots are in another order";
+    for (const Channel& one : here) {
+      if (!found_in(there, one)) what = "it lacks '" + one.name + "'";
+    }
+    for (const Channel& one : there) {
+      if (!found_in(here, one)) what = "it has '" + one.name + "', unlike " + world_->file;
+    }
     throw InputError({copy->model->file},
-                     "its robots and devices are not those of " + world_->file +
-                         ": an engine's worlds have the same, in the same order");
+                     what + ": an engine's worlds have the same robots and devices, in one order");
+  }
   return copy;
 }
 

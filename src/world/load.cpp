@@ -63,6 +63,7 @@ class Loader {
     if (!options.xacro_arguments.empty() && !context_.has_xacro)
       throw InputError({}, "--xacro-arg " + options.xacro_arguments.front() +
                                ": no file of this world is xacro, which alone has arguments");
+    world_.findings = findings_.list();  // what a robot that an option names may lack
     apply_drives(options.drives, world_);
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);

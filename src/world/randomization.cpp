@@ -146,8 +146,13 @@ class Randomizer {
 
   void change_models(const Draw& draw, const Target& target) {
     bool any = false;
+    const ModelInstance* still = nullptr;
     for (ModelInstance& instance : world_.models) {
       if (!matches(target.name, instance.name)) continue;
+      if (target.key == "mass" && (instance.model->is_static || instance.model->path)) {
+        still = &instance;
+        continue;
+      }
       any = true;
       const double value = not_negative(draw, drawn(draw, instance.name + "." + target.key));
       auto model = std::make_shared<Model>(*instance.model);
@@ -162,6 +167,9 @@ class Randomizer {
       }
       instance.model = std::move(model);
     }
+    if (!any && still)
+      throw InputError({}, fmt::format("{}: no force moves '{}', so its mass would change nothing",
+                                       text_of(draw), still->name));
     if (!any) none(draw, "model", target);
   }
 
@@ -172,6 +180,9 @@ class Randomizer {
       const Target target = target_of(*draw);
       for (size_t i = 0; i < world_.models.size(); ++i) {
         if (!matches(target.name, world_.models[i].name)) continue;
+        if (world_.models[i].model->path)
+          throw InputError({}, fmt::format("{}: the place of '{}' follows from its path",
+                                           text_of(*draw), world_.models[i].name));
         of_model[i].push_back(draw);
         any = true;
       }

@@ -60,7 +60,7 @@ std::vector<std::string> devices_of(const Model& model) {
 // The robots of a world by name.
 class RobotsByName {
  public:
-  explicit RobotsByName(WorldModel& world) {
+  explicit RobotsByName(WorldModel& world) : world_(world) {
     for (ModelInstance& instance : world.models) {
       if (instance.is_robot()) robots_.emplace(instance.name, &instance);
     }
@@ -74,10 +74,20 @@ class RobotsByName {
     const std::string near = nearest_word(name, names);
     throw InputError({}, option + ": there is no robot '" + name + "'" +
                              (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                             "; there are " + listed(names));
+                             "; there are " + listed(names) + first_error());
   }
 
  private:
+  // Why a robot may not be there.
+  std::string first_error() const {
+    for (const Finding& finding : world_.findings) {
+      if (finding.kind == Finding::Kind::error)
+        return "; " + finding.source.str() + ": " + finding.element + ": " + finding.text;
+    }
+    return "";
+  }
+
+  const WorldModel& world_;
   std::map<std::string, ModelInstance*> robots_;
 };
 

@@ -176,8 +176,10 @@ def test_a_copy_may_get_another_world():
         assert e.collisions(0) == {} and e.collisions(1) == {"r0": ["wall/l"]}
         e.reset(1)  # keeps its world
         assert ranges[1, 0, 2] == pytest.approx(1.0) and touching[1, 0] == 0
-        with pytest.raises(ValueError, match="its robots and devices are not those of"):
+        with pytest.raises(ruedo.BadWorld, match=r"it has 'r1/\w+', unlike"):
             e.reset(0, text=world(robots=2))
+        with pytest.raises(ruedo.BadWorld, match=r"it lacks 'r0/\w+'"):
+            e.reset(0, text=world(robots=0))
         assert ranges[0, 0, 2] == pytest.approx(1.0, abs=1e-6)  # as it was
 
 

@@ -70,6 +70,31 @@ def test_it_agrees_bit_for_bit_with_one_process(task):
     envs.close(), one.close()
 
 
+class Counting(ruedo.gym.Navigate):
+    def setup(self):
+        super().setup()
+        self.count = np.zeros(self.num_envs, int)
+
+    def info(self):
+        self.count += 1 + np.arange(self.num_envs)
+        return {"count": self.count}
+
+
+def test_what_a_task_tells_comes_from_all_processes():
+    """Also where the episodes of some of them go on."""
+    options = {"autoreset_mode": "SameStep", "max_episode_steps": 3, "beams": 4}
+    envs = ProcessVectorEnv(Counting, 3, workers=3, **options)
+    envs.reset(seed=1)
+    assert envs.step(np.zeros((3, 2)))[4]["count"].tolist() == [2, 2, 2]
+    envs.reset(options={"reset_mask": np.array([False, True, False])})
+    for step in range(2):
+        info = envs.step(np.zeros((3, 2)))[4]
+    assert info["count"].tolist() == [6, 5, 6]  # one more where an episode begins
+    assert info["final_info"]["count"].tolist() == [5, 0, 5]
+    assert info["final_info"]["_count"].tolist() == [True, False, True]
+    envs.close()
+
+
 def test_observations_are_the_callers_own():
     envs = ProcessVectorEnv(ruedo.gym.Navigate, 2, workers=2, beams=4)
     first, _ = envs.reset(seed=1)

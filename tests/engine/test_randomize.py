@@ -122,6 +122,8 @@ def test_settings_are_as_with_set():
         ({"p3dx.x": "uniform(0, 1)"}, "there is no model 'p3dx'"),
         ({"moon.brightness": "uniform(0, 1)"}, "there is no light 'moon'"),
         ({"p3at/lrf.no_such": "uniform(0, 1)"}, "there is no 'no_such'"),
+        ({"ground_plane.mass": "uniform(1, 2)"}, "no force moves 'ground_plane'"),
+        ({"*.mass": "uniform(1, 2)"}, None),
         ({"p3at.x": "choice(500)"}, None),
         (
             {"p3at.x": "choice(0)", "p3at.y": "choice(0)", "p3at.z": "choice(-0.3)"},
@@ -136,6 +138,17 @@ def test_wrong_descriptions_are_refused(draws, text):
     with pytest.raises(ValueError) as caught:
         ruedo.Engine(**ARENA, randomize=draws)
     assert text in str(caught.value)
+
+
+def test_what_a_path_leads_has_no_place_of_its_own():
+    world = ruedo.World().person([(0, 1, 1), (5, 2, 1)], name="leader").robot("p3at")
+    ways = {
+        "leader.x": "the place of 'leader' follows from its path",
+        "leader.mass": "no force moves 'leader'",
+    }
+    for target, text in ways.items():
+        with pytest.raises(ruedo.BadWorld, match=text):
+            ruedo.Engine(world, randomize={target: "uniform(1, 2)"})
 
 
 def test_repeated_texts_are_read_once_and_differ():

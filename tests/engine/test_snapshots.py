@@ -118,7 +118,7 @@ def test_arrays_and_commands_are_restored_too():
 
 def test_a_world_that_was_drawn_and_another_one_are_put_back():
     with arena(
-        worlds=2, randomize={"p3at.x": "uniform(-2, 2)", "box*.mass": "uniform(0.5, 2)"}
+        worlds=2, randomize={"p3at.x": "uniform(-2, 2)", "p3at.mass": "uniform(0.5, 2)"}
     ) as engine:
         engine.step(np.full((2, 1, 2), [0.5, 0.4]), 100)
         saved, drawn = engine.save(1), engine.drawn(1)

@@ -148,8 +148,11 @@ def test_depth_is_observed_below_its_camera():
 # metre from it.
 
 
+DISTANCE = spaces.Box(0.0, 20.0, (1,), np.float32)
+
+
 class Approach(ruedo.gym.Task):
-    observation_space = spaces.Box(0.0, 20.0, (1,), np.float32)
+    observation_space = DISTANCE
     action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
     max_episode_steps = 60
     disable = ("robot/camera", "robot/sonar_front", "robot/sonar_rear")
@@ -208,6 +211,37 @@ def test_a_custom_task_defines_its_outcome():
     np.testing.assert_allclose(total[over], begin[over] - 1.0, atol=0.06)
     assert over.any()
     envs.close()
+
+
+class Telling(Approach):
+    """Draws the robot's mass, and tells how far it is from the wall."""
+
+    randomize = {"robot.mass": "uniform(0.5, 2)"}
+
+    def info(self):
+        return {"distance": -self.x}
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_a_task_draws_and_tells_values_of_its_own(mode):
+    envs = ruedo.gym.TaskVectorEnv(Telling, 3, autoreset_mode=mode, max_episode_steps=4)
+    assert envs.task.max_episode_steps == 4
+    observations, info = envs.reset(seed=1)
+    assert len(set(info["drawn"]["robot.mass"])) == 3
+    for _ in range(4):
+        np.testing.assert_array_equal(np.float32(info["distance"]), observations[:, 0])
+        assert info["_distance"].all()
+        observations, _, _, truncated, info = envs.step(np.ones((3, 1)))
+    assert truncated.all()
+    if mode == "SameStep":
+        ends = [one[0] for one in info["final_obs"]]
+        np.testing.assert_array_equal(np.float32(info["final_info"]["distance"]), ends)
+        assert (info["distance"] != info["final_info"]["distance"]).all()
+    envs.close()
+    env = ruedo.gym.TaskEnv(Telling, randomize={"robot.mass": "choice(3)"})
+    _, info = env.reset(seed=1)
+    assert info["drawn"] == {"robot.mass": 3.0} and isinstance(info["distance"], float)
+    env.close()
 
 
 def test_episodes_of_a_custom_task_are_saved_with_its_state():
@@ -283,6 +317,13 @@ def test_a_task_without_end_is_never_truncated():
     envs.close()
 
 
+def robots(count):
+    world = ruedo.World()
+    for i in range(count):
+        world.robot("p3at", 2.0 * i, name=f"robot_{i + 1}" if i else "robot")
+    return world
+
+
 WRONG = {
     "no space": ({"observation_space": 3}, TypeError, "observation_space is a space"),
     "no world": ({"scene": ruedo.gym.Task.scene}, NotImplementedError, "neither a world nor"),
@@ -299,7 +340,61 @@ WRONG = {
     "robot": (
         {"setup": lambda self: self.position("nobody")},
         ValueError,
-        r"robot is 'nobody'; those with 'pose' are \['robot'\]",
+        r"Wrong: 'nobody' has no 'pose'; \['robot'\] have",
+    ),
+    "pair": (
+        {"outcome": lambda self: (np.zeros(2), np.zeros(2))},
+        ValueError,
+        r"Wrong\.outcome\(\) gives rewards, successes and failures, not",
+    ),
+    "no reward": (
+        {"outcome": lambda self: (np.array([0.0, np.nan]), np.zeros(2), np.zeros(2))},
+        ValueError,
+        r"outcome\(\) gives the reward nan in environment 1",
+    ),
+    "nothing seen": (
+        {"observe": lambda self: np.array([[np.nan], [1.0]])},
+        ValueError,
+        r"observe\(\) gives nan in environment 0",
+    ),
+    "text seen": (
+        {"observe": lambda self: np.array([["a"], ["b"]])},
+        ValueError,
+        r"observe\(\) gives <U1; observation_space asks for float32",
+    ),
+    "half a colour": (
+        {"observation_space": spaces.Box(0, 255, (1,), np.uint8)},
+        ValueError,
+        r"observe\(\) gives float64; observation_space asks for uint8",
+    ),
+    "one of two terms": (
+        {
+            "observation_space": spaces.Dict({"a": DISTANCE, "b": DISTANCE}),
+            "observe": lambda self: {"a": -self.x[:, None]},
+        },
+        ValueError,
+        r"gives a dict of \['a', 'b'\], not \['a'\]",
+    ),
+    "told": ({"info": lambda self: {"x": 3.0}}, ValueError, r"info\(\)\['x'\] is 3.0, not 2 num"),
+    "told twice": (
+        {"info": lambda self: {"success": self.x}},
+        ValueError,
+        r"info\(\) has 'success', which `info` has",
+    ),
+    "no commands": ({"commands": ruedo.gym.Task.commands}, TypeError, r"has no commands\(\), and"),
+    "horizon": ({"max_episode_steps": 0}, ValueError, "is 0; allowed are 1 and more, and -1"),
+    "seconds": ({"action_seconds": "0.1"}, TypeError, "action_seconds"),
+    "disable": ({"disable": "robot/camera"}, TypeError, "disable is a list of texts"),
+    "draws": ({"randomize": "robot.x"}, TypeError, "randomize is a dict"),
+    "scene": (
+        {"scene": lambda self, number: robots(1 if number == 0 else 2)},
+        ruedo.BadWorld,
+        r"Wrong\.scene\([1-9]\d+\): \S*Wrong: it has 'robot_2/\w+', unlike",
+    ),
+    "file of a scene": (
+        {"scene": lambda self, number: robots(1).robot("nobody") if number else robots(1)},
+        ruedo.BadWorld,
+        r"Wrong\.scene\([1-9]\d+\): .*nobody",
     ),
     "actions": ({"action_space": spaces.Text(3)}, TypeError, "is a Box, Discrete or MultiDiscrete"),
 }
@@ -312,6 +407,38 @@ def test_an_error_in_a_task_is_reported(what):
         envs = ruedo.gym.TaskVectorEnv(type("Wrong", (Approach,), attributes), 2)
         envs.reset(seed=1)
         envs.step(np.zeros((2, 1)))
+
+
+def test_what_a_world_has_without_effect_is_a_warning():
+    sensor = '<sensor name="touch" type="bumper"/>'
+    odd = f'<model name="odd"><static>1</static><link name="l">{sensor}</link></model>'
+
+    class Odd(Approach):
+        def scene(self, number):
+            return super().scene(number).sdf(odd)
+
+    with pytest.warns(UserWarning, match="Odd: .*bumper"):
+        ruedo.gym.TaskVectorEnv(Odd).close()
+
+
+def test_names_of_robots_are_theirs_alone():
+    world = ruedo.World().robot("p3at", name="robot")
+    with pytest.raises(ValueError, match="name is 'robot', which another model has"):
+        world.robot("p3at", 2.0, name="robot")
+    world.robot("p3at", 2.0).robot("p3at", 4.0)
+    with ruedo.Engine(world) as engine:
+        assert engine.robots == ("robot", "p3at", "p3at_2")
+
+
+def test_a_model_that_is_missing_is_named_with_what_it_leaves_without_a_robot():
+    world = ruedo.World().robot("p3", name="robot")
+    with pytest.raises(ruedo.BadWorld, match=r"there is no robot 'robot'.*\bp3\b"):
+        ruedo.Engine(world, disable=["robot/camera"])
+
+
+def test_sdf_is_not_the_name_of_a_world():
+    with pytest.raises(ValueError, match=r"SDF itself is Engine\(text="):
+        ruedo.Engine(str(ruedo.World()))
 
 
 def test_a_class_that_is_not_a_task_is_refused():

@@ -100,14 +100,9 @@ class PyEngine {
     const Unlocked unlocked;
     texts_ = std::make_unique<ruedo::world::TextLoader>(world, options);
     const auto model = text ? read(*text) : ruedo::world::load_world(world, options);
-    for (const ruedo::Finding& finding : model->findings) {
-      if (finding.kind == ruedo::Finding::Kind::error && !allow_errors)
-        throw ruedo::InputError(finding.source, finding.element + ": " + finding.text +
-                                                    "; allow_errors=True takes the world as it is");
-    }
+    take(model->findings, allow_errors);
     engine_ = std::make_unique<Engine>(model, engine);
-    for (const ruedo::Finding& finding : model->findings)
-      findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
+    take(engine_->findings().list(), allow_errors);
     world_ = model;
     for (const std::string& one : spawns) result_options_.push_back("--spawn=" + one);
     for (const std::string& one : drives) result_options_.push_back("--drive=" + one);
@@ -281,6 +276,16 @@ class PyEngine {
     Mark mark_;
     Unlocked unlocked_;  // locked again first
   };
+  void take(const std::vector<ruedo::Finding>& findings, bool allow_errors) {
+    for (const ruedo::Finding& finding : findings) {
+      const std::string text = finding.element + ": " + finding.text;
+      if (finding.kind == ruedo::Finding::Kind::error && !allow_errors)
+        throw ruedo::InputError(finding.source,
+                                text + "; allow_errors=True takes the world as it is");
+      findings_.push_back(finding.source.str() + ": " + text);
+    }
+  }
+
   void refuse_others() const {
     if (at_work_)
       throw std::runtime_error(

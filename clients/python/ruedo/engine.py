@@ -150,10 +150,7 @@ class Engine:
             if text is not None:
                 raise TypeError("Engine() needs either a World or a text")
             world, text, allow_absolute = "world", str(world), True
-        if not isinstance(world, (str, os.PathLike)):
-            raise TypeError(f"world is a file, the name of a world or a World, not {shown(world)}")
-        if not word("world", world):
-            raise ValueError("world is '': it is a file or the name of a world")
+        _check_world(world)
         if not isinstance(text, (str, type(None))):
             raise TypeError(f"text is a world's SDF as text, not {shown(text)}")
         if text is not None:
@@ -402,7 +399,10 @@ class Engine:
             worlds_of = texts("text", given)
             if len(worlds_of) != count:
                 raise ValueError(f"{len(worlds_of)} texts for {count} worlds")
-        self._core.reset(indices, seeds, worlds_of)
+        try:
+            self._core.reset(indices, seeds, worlds_of)
+        except _engine.InputError as error:
+            raise BadWorld(str(error)) from None
         for index, one in zip(indices, seeds):
             self._seeds[index] = one
 
@@ -506,6 +506,16 @@ class Engine:
                 )
             return [int(i) for i in np.flatnonzero(given)]
         return [self._checked(i) for i in np.atleast_1d(given)]
+
+
+def _check_world(world: Any) -> None:
+    """Raises TypeError and ValueError."""
+    if not isinstance(world, (str, os.PathLike)):
+        raise TypeError(f"world is a file, the name of a world or a World, not {shown(world)}")
+    if not word("world", world):
+        raise ValueError("world is '': it is a file or the name of a world")
+    if str(world).lstrip().startswith("<"):
+        raise ValueError("world is a file or the name of a world; SDF itself is Engine(text=...)")
 
 
 def _made(world: bytes, **given: Any) -> Any:

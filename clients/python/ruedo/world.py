@@ -127,12 +127,14 @@ class World:
         sensors: Mapping[str, str] | None = None,
         link: str = "base_link",
     ) -> World:
-        """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name:
-        default the model's. sensors: further ones of a link, by name, each an SDF type ("navsat",
-        "imu") or its whole content ("<sensor type='camera'>...").
+        """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name: by
+        default the model's, with a number if that is taken. sensors: further ones of a link, by
+        name, each an SDF type ("navsat", "imu") or its whole content ("<sensor type='camera'>...").
         """
         arguments.text("model", model)
         uri = model if "://" in model or os.sep in model else f"model://{model}"
+        if name in self._names:
+            raise ValueError(f"name is {arguments.shown(name)}, which another model has")
         own = self._unused(name or Path(model).stem)
         self._models.append(
             f"<include><uri>{escape(uri)}</uri><name>{escape(own)}</name>"

@@ -259,7 +259,13 @@ class GoalTask(DriveTask):
 
     def begin(self, episodes: NDArray[np.intp]) -> None:
         for i in episodes:
-            self.goals[i] = self.scenes[i].goal
+            scene = self.scenes[i]
+            if not hasattr(scene, "goal"):
+                raise TypeError(
+                    f"{type(self).__name__}.scene({scene.number}) has no goal: a GoalTask's scenes are "
+                    "ruedo.rooms.Room(number, sdf, start=(x, y, heading), goal=(x, y))"
+                )
+            self.goals[i] = scene.goal
         self._distance[episodes] = self._distances()[episodes]
 
     def outcome(self) -> Outcome:

@@ -20,8 +20,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..arguments import check_known, named, shown, texts, whole
+from ..arguments import check_known, finite, named, shown, texts, whole
 from ..engine import MOST_WORLDS, Engine, Saved, SavedWorld
+from ..errors import BadWorld
 from ..rooms import TEST_ROOMS, Scene
 from ..world import World
 from .task import Outcome, Task, checked_actions
@@ -37,6 +38,7 @@ MODES = (None, "rgb_array", "human")
 MOST_SEED = 2**128 - 1  # that of numpy's SeedSequence
 
 Info = dict[str, Any]
+_INFO = ("success", "collision", "drawn", "final_obs", "final_info")  # besides what a task tells
 
 
 class _SavedEpisode:
@@ -121,7 +123,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         split: Literal["train", "test"] = "train",
         noise: bool = True,
         threads: int = 0,
-        randomize: dict[str, str] | None = None,
+        randomize: Mapping[str, str] | None = None,
         settings: Mapping[str, object] | None = None,
         disable: Iterable[str] = (),
         max_episode_steps: int | None = None,
@@ -148,19 +150,19 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self.task = task(**options)
         limit = self.task.max_episode_steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = whole("max_episode_steps", limit, -1)
+        if limit == 0:
+            raise ValueError("max_episode_steps is 0; allowed are 1 and more, and -1: never")
+        self.task.max_episode_steps = limit
         self.num_envs = num_envs
         self.autoreset_mode = checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self._first = 0 if split == "train" else TEST_ROOMS
         self._options: Info = {
-            "settings": {
-                **self.task.settings,
-                **named("settings", settings, '{"robot/lrf.update_rate": 10}'),
-            },
-            "disable": [*self.task.disable, *texts("disable", disable)],
+            "settings": _both("settings", self.task, settings, '{"robot/lrf.update_rate": 10}'),
+            "disable": [*texts("disable", self.task.disable), *texts("disable", disable)],
             "noise": noise,
-            "randomize": randomize or {},
+            "randomize": _both("randomize", self.task, randomize, '{"robot.x": "uniform(-2, 2)"}'),
         }
         self._begin_spaces()
         self._begin_engine(threads)
@@ -183,6 +185,13 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             raise TypeError(
                 f"{type(self.task).__name__}.action_space is a Box, Discrete or MultiDiscrete, not {shown(done)}"
             )
+        if type(self.task).commands is Task.commands and (
+            not isinstance(done, spaces.Box) or done.shape != (2,)
+        ):
+            raise TypeError(
+                f"{type(self.task).__name__} has no commands(), and its action_space is not that of two "
+                f"numbers, a speed and a turn rate, but {done}"
+            )
         self.single_observation_space = observed
         self.single_action_space = done
         self.observation_space = batch_space(observed, self.num_envs)
@@ -203,7 +212,9 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         )
         if self.render_mode == "human" and not self._engine.robots:
             raise ValueError("render_mode 'human' needs a robot with a drive; the scene has none")
-        seconds = self.task.action_seconds
+        for finding in self._engine.findings:
+            warnings.warn(f"{type(self.task).__name__}: {finding}", stacklevel=2)
+        seconds = finite("action_seconds", self.task.action_seconds)
         self._steps = round(seconds / self._engine.step_size)
         if self._steps < 1 or abs(self._steps * self._engine.step_size - seconds) > 1e-9:
             raise ValueError(
@@ -269,7 +280,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                 self._generators[i] = np.random.default_rng(seeds[i])
         info: Info = {}
         self._begin(begin, info)
-        return self._observe(), info
+        return self._observe(), info | self._told()
 
     def step(
         self, actions: NDArray[Any]
@@ -321,9 +332,8 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         if self._console and commands is not None:
             self._console.step(commands[0], self._steps)
         self._actions += 1
-        rewards, success, failure = self._outcome()
+        rewards, success, failure = self._outcome(begun)
         if begun is not None:
-            rewards[begun], success[begun], failure[begun] = 0.0, False, False
             self._actions[begun] = 0
         terminated = success | failure
         late = self._actions >= self.max_episode_steps
@@ -331,6 +341,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._over = terminated | truncated
         info |= {"success": success, "_success": acted, "collision": failure, "_collision": acted}
         observations = self._observe()
+        info |= self._told()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             observations = self._begin_at_once(observations, info)
         return observations, rewards, terminated, truncated, info
@@ -351,10 +362,16 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             )
         return commands
 
-    def _outcome(self) -> Outcome:
-        rewards, success, failure = self.task.outcome()
+    def _outcome(self, begun: NDArray[np.bool_] | None) -> Outcome:
+        """Nothing where an episode has only begun."""
+        given = self.task.outcome()
+        if not isinstance(given, tuple) or len(given) != 3:
+            raise ValueError(
+                f"{type(self.task).__name__}.outcome() gives rewards, successes and failures, not {shown(given)}"
+            )
+        rewards, success, failure = given
         outcome = Outcome(
-            np.asarray(rewards, np.float64), np.asarray(success, bool), np.asarray(failure, bool)
+            np.array(rewards, np.float64), np.array(success, bool), np.array(failure, bool)
         )
         for name, values in zip(("rewards", "success", "failure"), outcome):
             if values.shape != (self.num_envs,):
@@ -362,16 +379,41 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                     f"{type(self.task).__name__}.outcome() gives {name} of the shape {values.shape}, "
                     f"not {(self.num_envs,)}"
                 )
+        if begun is not None:
+            for values in outcome:
+                values[begun] = 0
+        if not np.isfinite(outcome.rewards).all():
+            i = int(np.flatnonzero(~np.isfinite(outcome.rewards))[0])
+            raise ValueError(
+                f"{type(self.task).__name__}.outcome() gives the reward {outcome.rewards[i]} in environment {i}"
+            )
         return outcome
+
+    def _told(self) -> Info:
+        """The task's own part of the info, with Gymnasium's masks."""
+        told: Info = {}
+        for name, given in self.task.info().items():
+            values = np.array(given)
+            if values.shape != (self.num_envs,) or values.dtype.kind not in "biuf":
+                raise ValueError(
+                    f"{type(self.task).__name__}.info()[{name!r}] is {shown(given)}, not {self.num_envs} numbers"
+                )
+            if name in _INFO:
+                raise ValueError(
+                    f"{type(self.task).__name__}.info() has {name!r}, which `info` has"
+                )
+            told |= {name: values, f"_{name}": np.ones(self.num_envs, bool)}
+        return told
 
     def _observe(self) -> Any:
         observed = self.task.observe()
         if not isinstance(self.observation_space, spaces.Dict):
             return self._checked_observation("", observed, self.observation_space)
         names = list(self.observation_space)
-        if not isinstance(observed, Mapping) or sorted(observed) != sorted(names):
+        if not isinstance(observed, Mapping) or set(observed) != set(names):
+            given = list(observed) if isinstance(observed, Mapping) else shown(observed)
             raise ValueError(
-                f"{type(self.task).__name__}.observe() gives a dict of {names}, not {shown(observed)}"
+                f"{type(self.task).__name__}.observe() gives a dict of {names}, not {given}"
             )
         return {
             name: self._checked_observation(f"[{name!r}]", observed[name], space)
@@ -385,6 +427,19 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                 f"{type(self.task).__name__}.observe(){which} gives the shape {values.shape}; "
                 f"observation_space asks for {space.shape}"
             )
+        kind = values.dtype.kind
+        if kind not in "biuf" or (
+            kind == "f" and space.dtype is not None and space.dtype.kind != "f"
+        ):
+            raise ValueError(
+                f"{type(self.task).__name__}.observe(){which} gives {values.dtype}; observation_space "
+                f"asks for {space.dtype}"
+            )
+        if kind == "f" and np.isnan(values).any():
+            i = int(np.argwhere(np.isnan(values))[0][0])
+            raise ValueError(
+                f"{type(self.task).__name__}.observe(){which} gives nan in environment {i}"
+            )
         return aligned_copy(values, space.dtype)
 
     def _begin_at_once(self, observations: Any, info: Info) -> Any:
@@ -392,11 +447,16 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         for i in np.flatnonzero(self._over).tolist():
             info["final_obs"][i] = row_of(observations, i)
         over = self._over.copy()
-        info["final_info"] = {name: info[name].copy() for name in ("success", "collision")}
-        info["final_info"] |= {"_success": over, "_collision": over}
+        info["final_info"] = {
+            name: over if name.startswith("_") else values.copy()
+            for name, values in info.items()
+            if name != "final_obs"
+        }
         info["_final_obs"] = info["_final_info"] = over
         self._begin(np.flatnonzero(self._over), info)
-        return self._observe()
+        observations = self._observe()
+        info |= self._told()
+        return observations
 
     def save(self, indices: int | Sequence[int] | NDArray[Any] | None = None) -> SavedEpisodes:
         """The episodes of these environments (an index, several, a mask, or None for all) as they
@@ -539,7 +599,11 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
             self._scenes[i] = replace(scene, number=number) if self._fixed else self._scene(number)
             seeds.append(int(draw(2**31)))
         texts = [self._text(self._scenes[i]) for i in indices]
-        self._engine.reset(indices, seed=seeds, text=None if self._fixed else texts)
+        try:
+            self._engine.reset(indices, seed=seeds, text=None if self._fixed else texts)
+        except BadWorld:
+            self._name_refused_scene(indices, seeds, texts)
+            raise
         self._actions[indices] = 0
         self._over[indices] = False
         self._unbegun[indices] = False
@@ -547,6 +611,17 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._tell_drawn(indices, info)
         if self.render_mode == "human":
             self._show(texts[0], seeds[0])
+
+    def _name_refused_scene(
+        self, indices: NDArray[np.intp], seeds: Sequence[int], texts: Sequence[str]
+    ) -> None:
+        """Raises BadWorld for the first of the scenes that the engine does not take."""
+        for i, seed, text in zip(indices.tolist(), seeds, texts):
+            try:
+                self._engine.reset(i, seed=seed, text=None if self._fixed else text)
+            except BadWorld as error:
+                scene = f"{type(self.task).__name__}.scene({self._scenes[i].number})"
+                raise BadWorld(f"{scene}: {error}") from None
 
     def _tell_drawn(self, indices: NDArray[np.intp], info: Info) -> None:
         """The values that randomize drew for the episodes that begin; NaN in the other rows."""
@@ -569,6 +644,11 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
 
     def _text(self, scene: Scene) -> str:
         return scene.seen_from_above() if self.render_mode == "rgb_array" else scene.sdf
+
+
+def _both(what: str, task: Task, given: Mapping[str, Any] | None, example: str) -> Info:
+    """The task's own, and what replaces it."""
+    return {**named(what, getattr(task, what), example), **named(what, given, example)}
 
 
 def aligned_copy(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
@@ -672,9 +752,13 @@ def _of_one(info: Info) -> Info:
     """The info of the only environment, without Gymnasium's masks."""
     return {
         name: _of_one(values) if isinstance(values, dict) else values[0].item()
-        for name, values in info.items()
-        if not name.startswith("_")
+        for name, values in without_masks(info).items()
     }
+
+
+def without_masks(info: Info) -> Info:
+    """The info of a vector environment, without Gymnasium's masks."""
+    return {name: values for name, values in info.items() if not name.startswith("_")}
 
 
 def checked_mode(mode: Any) -> AutoresetMode:

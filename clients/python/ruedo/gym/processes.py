@@ -374,7 +374,7 @@ def _own(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _merged(parts: Sequence[Info], rows: Sequence[slice], num_envs: int) -> Info:
-    """The info of all environments. What a worker does not have is False, NaN or None there."""
+    """The info of all environments. What a worker does not have is False, NaN, None or 0 there."""
     merged: Info = {}
     for name in dict.fromkeys(name for part in parts for name in part):
         have = [(part[name], these) for part, these in zip(parts, rows) if name in part]
@@ -384,7 +384,7 @@ def _merged(parts: Sequence[Info], rows: Sequence[slice], num_envs: int) -> Info
             )
             continue
         dtype = have[0][0].dtype
-        missing = {"b": False, "f": np.nan}.get(dtype.kind)
+        missing = {"b": False, "f": np.nan, "O": None}.get(dtype.kind, 0)
         merged[name] = np.full(num_envs, missing, dtype)
         for values, these in have:
             merged[name][these] = values

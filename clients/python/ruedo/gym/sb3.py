@@ -24,7 +24,7 @@ except ImportError as _error:
         "ruedo.gym.sb3 needs Stable-Baselines3: pip install stable-baselines3"
     ) from _error
 
-from .environments import TaskVectorEnv, row_of
+from .environments import TaskVectorEnv, row_of, without_masks
 from .task import Task
 
 
@@ -53,9 +53,8 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc, unused-ignore]    # Stable-Baseli
 
     def reset(self) -> Any:
         observations, info = self.envs.reset(seed=self._seeds)
-        self.reset_infos = [
-            {"drawn": row_of(info["drawn"], i)} if info else {} for i in range(self.num_envs)
-        ]
+        told = without_masks(info)
+        self.reset_infos = [row_of(told, i) for i in range(self.num_envs)]
         self._returns[:], self._lengths[:] = 0.0, 0
         self._reset_seeds()
         self._reset_options()
@@ -70,8 +69,9 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc, unused-ignore]    # Stable-Baseli
         self._lengths += 1
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        told = without_masks(info.get("final_info", {}))
         for i in np.flatnonzero(over).tolist():
-            infos[i] = {
+            infos[i] = row_of(told, i) | {
                 "terminal_observation": info["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i]),
                 "is_success": bool(info["success"][i]),

@@ -46,7 +46,8 @@ class Task:
     world: of every episode, if `scene` is not defined: a file, the name of a world, or a
     `ruedo.World`. max_episode_steps: actions until an episode is truncated; -1: never.
     action_seconds: sim time of an action, a multiple of the world's step. settings: of devices, as
-    ``--set``. disable: devices that are not needed, "robot/camera".
+    ``--set``. disable: devices that are not needed, "robot/camera". randomize: what is drawn anew
+    for each episode, as of `ruedo.Engine`.
     """
 
     observation_space: spaces.Space[Any]
@@ -56,6 +57,7 @@ class Task:
     action_seconds: float = 0.1
     settings: Mapping[str, object] = {}
     disable: Sequence[str] = ()
+    randomize: Mapping[str, str] = {}
 
     # There when an environment has been made.
     engine: Engine
@@ -87,6 +89,10 @@ class Task:
         """Rewards, successes and failures after an action. Called once per action."""
         raise NotImplementedError(f"{type(self).__name__} has no outcome()")
 
+    def info(self) -> Mapping[str, NDArray[Any]]:
+        """Further entries of ``info`` with an observation: a number for each environment."""
+        return {}
+
     def observe(self) -> Any:
         """Observations after an action or at an episode's beginning: an array of the shape and type
         of ``observation_space`` with a row for each environment; a dict of these for a Dict.
@@ -108,7 +114,10 @@ class Task:
         found = [owner for owner, *names in self.engine.devices if device in map(str.lower, names)]
         owners = list(dict.fromkeys(found))
         if robot not in owners:
-            raise ValueError(f"robot is {shown(robot)}; those with {device!r} are {owners}")
+            raise ValueError(
+                f"{type(self).__name__}: {shown(robot)} has no {device!r}; {owners} have. A model has "
+                "a pose if it has a drive or a sensor"
+            )
         return values[:, owners.index(robot)]
 
     def position(self, robot: str | None = None) -> NDArray[np.float64]:
