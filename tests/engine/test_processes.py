@@ -87,7 +87,7 @@ def test_what_a_task_tells_comes_from_all_processes():
     envs.reset(seed=1)
     assert envs.step(np.zeros((3, 2)))[4]["count"].tolist() == [2, 2, 2]
     envs.reset(options={"reset_mask": np.array([False, True, False])})
-    for step in range(2):
+    for _ in range(2):
         info = envs.step(np.zeros((3, 2)))[4]
     assert info["count"].tolist() == [6, 5, 6]  # one more where an episode begins
     assert info["final_info"]["count"].tolist() == [5, 0, 5]
