@@ -80,7 +80,7 @@ class Counting(ruedo.gym.Navigate):
         return {"count": self.count}
 
 
-def test_what_a_task_tells_comes_from_all_processes():
+def test_info_of_a_task_comes_from_all_processes():
     """Also where the episodes of some of them go on."""
     options = {"autoreset_mode": "SameStep", "max_episode_steps": 3, "beams": 4}
     envs = ProcessVectorEnv(Counting, 3, workers=3, **options)

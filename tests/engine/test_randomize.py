@@ -140,7 +140,7 @@ def test_wrong_descriptions_are_refused(draws, text):
     assert text in str(caught.value)
 
 
-def test_what_a_path_leads_has_no_place_of_its_own():
+def test_draws_for_a_person_on_a_path_are_refused():
     world = ruedo.World().person([(0, 1, 1), (5, 2, 1)], name="leader").robot("p3at")
     ways = {
         "leader.x": "the place of 'leader' follows from its path",

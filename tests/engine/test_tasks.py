@@ -409,7 +409,7 @@ def test_an_error_in_a_task_is_reported(what):
         envs.step(np.zeros((2, 1)))
 
 
-def test_what_a_world_has_without_effect_is_a_warning():
+def test_unsupported_elements_of_a_world_are_warnings():
     sensor = '<sensor name="touch" type="bumper"/>'
     odd = f'<model name="odd"><static>1</static><link name="l">{sensor}</link></model>'
 
@@ -430,7 +430,7 @@ def test_names_of_robots_are_theirs_alone():
         assert engine.robots == ("robot", "p3at", "p3at_2")
 
 
-def test_a_model_that_is_missing_is_named_with_what_it_leaves_without_a_robot():
+def test_the_error_about_a_missing_robot_names_its_missing_model():
     world = ruedo.World().robot("p3", name="robot")
     with pytest.raises(ruedo.BadWorld, match=r"there is no robot 'robot'.*\bp3\b"):
         ruedo.Engine(world, disable=["robot/camera"])
