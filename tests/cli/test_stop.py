@@ -302,8 +302,9 @@ def test_a_long_command_ends_at_once_and_leaves_nothing(words, told, long_log, t
         while process.poll() is None and processor_seconds(process) < begin + share:
             assert time.monotonic() < deadline
             time.sleep(0.005)
+        short = words[0] in ("info", "diff")  # these may be done when the signal comes
         if process.poll() is not None:
-            assert words[0] in ("info", "diff")  # the others take longer
+            assert short
             continue
         process.send_signal(number)
         worked = processor_seconds(process)
@@ -312,4 +313,6 @@ def test_a_long_command_ends_at_once_and_leaves_nothing(words, told, long_log, t
         assert process.returncode in (-number, 128 + number)
         assert used.ru_utime + used.ru_stime - worked < 0.2
         assert sorted(tmp_path.iterdir()) == before
-        assert all(path.read_text() == "as before" for path in before)
+        for path in before:
+            text = path.read_text()
+            assert text == "as before" or (short and text.endswith("</html>\n"))
