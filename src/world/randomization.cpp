@@ -144,16 +144,31 @@ class Randomizer {
     if (!any) none(draw, "light", target);
   }
 
-  void change_models(const Draw& draw, const Target& target) {
-    bool any = false;
-    const ModelInstance* still = nullptr;
-    for (ModelInstance& instance : world_.models) {
+  // The models that a draw would change. Throws if there is none.
+  std::vector<size_t> models_of(const Draw& draw) const {
+    const Target target = target_of(draw);
+    std::vector<size_t> models;
+    std::string unchanged;
+    for (size_t i = 0; i < world_.models.size(); ++i) {
+      const ModelInstance& instance = world_.models[i];
       if (!matches(target.name, instance.name)) continue;
-      if (target.key == "mass" && (instance.model->is_static || instance.model->path)) {
-        still = &instance;
-        continue;
+      if (is_place(target.key) && instance.model->path) {
+        unchanged = fmt::format("the place of '{}' follows from its path", instance.name);
+      } else if (target.key == "mass" && (instance.model->is_static || instance.model->path)) {
+        unchanged =
+            fmt::format("no force moves '{}', so its mass would change nothing", instance.name);
+      } else {
+        models.push_back(i);
       }
-      any = true;
+    }
+    if (!models.empty()) return models;
+    if (unchanged.empty()) none(draw, "model", target);
+    throw InputError({}, text_of(draw) + ": " + unchanged);
+  }
+
+  void change_models(const Draw& draw, const Target& target) {
+    for (const size_t i : models_of(draw)) {
+      ModelInstance& instance = world_.models[i];
       const double value = not_negative(draw, drawn(draw, instance.name + "." + target.key));
       auto model = std::make_shared<Model>(*instance.model);
       for (Link& link : model->links) {
@@ -167,26 +182,12 @@ class Randomizer {
       }
       instance.model = std::move(model);
     }
-    if (!any && still)
-      throw InputError({}, fmt::format("{}: no force moves '{}', so its mass would change nothing",
-                                       text_of(draw), still->name));
-    if (!any) none(draw, "model", target);
   }
 
   void place(const std::vector<const Draw*>& draws) {
     std::vector<std::vector<const Draw*>> of_model(world_.models.size());
     for (const Draw* draw : draws) {
-      bool any = false;
-      const Target target = target_of(*draw);
-      for (size_t i = 0; i < world_.models.size(); ++i) {
-        if (!matches(target.name, world_.models[i].name)) continue;
-        if (world_.models[i].model->path)
-          throw InputError({}, fmt::format("{}: the place of '{}' follows from its path",
-                                           text_of(*draw), world_.models[i].name));
-        of_model[i].push_back(draw);
-        any = true;
-      }
-      if (!any) none(*draw, "model", target);
+      for (const size_t i : models_of(*draw)) of_model[i].push_back(draw);
     }
     for (const bool robots : {false, true}) {  // obstacles first: robots need free space among them
       for (size_t i = 0; i < world_.models.size(); ++i) {

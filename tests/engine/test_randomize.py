@@ -151,6 +151,14 @@ def test_draws_for_a_person_on_a_path_are_refused():
             ruedo.Engine(world, randomize={target: "uniform(1, 2)"})
 
 
+def test_a_pattern_passes_over_what_it_cannot_change():
+    world = ruedo.World().box(2, 0, mass=1, name="thing_1").robot("p3at")
+    world.person([(0, 1, 1), (5, 2, 1)], name="thing_2")
+    for key in ("x", "yaw", "mass"):
+        with ruedo.Engine(world, randomize={f"thing*.{key}": "uniform(2, 3)"}) as engine:
+            assert list(engine.drawn()) == [f"thing_1.{key}"]
+
+
 def test_repeated_texts_are_read_once_and_differ():
     from ruedo.rooms import make_room
 
