@@ -729,6 +729,8 @@ public final class Probe {
             if (how.equals("other")) throw new IllegalStateException("another fault");
             attempt("raised", () -> call(there, how));
             attempt("once", odometry::latest);
+            long deadline = System.nanoTime() + (long) (1e9 * PATIENCE); // the next sample comes
+            while (others.get() < 2 && System.nanoTime() < deadline) Thread.sleep(10);
             say("others", others.get() > 1);
         } catch (IllegalStateException error) {
             say("won", error.getMessage());
